@@ -98,9 +98,8 @@ def diagnose_log(
         return LogDiagnosis(log.name, robot, motion(), None, cautions=cautions)
     if log.command == "none":
         if test is not None:
-            raise LogError(
-                f"--test: {log.name} has no commands, and frames are tested on some of its own; leave it out"
-            )
+            problem = f"--test: {log.name} has no commands, and frames are tested on some of its own"
+            raise LogError(f"{problem}; leave it out")
         return LogDiagnosis(log.name, robot, None, camera(), cautions=cautions)
     (moved, no_motion), (pictured, no_camera) = _or_refusal(motion), _or_refusal(camera)
     if moved is None and pictured is None:
@@ -135,12 +134,9 @@ AT_ONCE = 60
 
 
 class PredictedPictures(NamedTuple):
-    """Some of a log's frames as a model would have seen them.
+    """Some of a log's frames (n,) as a model would have seen them: red, green and blue (n, rows, columns, 3), 0 to 255.
 
-    Attributes:
-        numbers: Which of the log's frames (n,).
-        pictures: Red, green and blue (n, rows, columns, 3), 0 to 255.
-        grey_errors: Mean absolute difference from the log's pictures on the floor (n,) [grey levels].
+    `grey_errors` are mean absolute differences from the log's pictures on the floor (n,) [grey levels].
     """
 
     numbers: NDArray[np.intp]

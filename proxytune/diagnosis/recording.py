@@ -24,14 +24,13 @@ from proxytune.logs import COMMANDS, Frames, Log, LogEpisode
 POSITION_NOISE_M = 0.002
 HEADING_NOISE_RAD = 0.005
 """White noise of a measured pose, as a tracker above the floor has it."""
-HEADING_NOISE_DEG = math.degrees(HEADING_NOISE_RAD)
 
 PICTURES = "frames/%06d.png"
 """Where a log's pictures lie in its folder."""
 CAMERA = {
     "frames": PICTURES,
     "exposure": "fixed",
-    "poses": {"position_m": POSITION_NOISE_M, "heading_deg": round(HEADING_NOISE_DEG, 4)},
+    "poses": {"position_m": POSITION_NOISE_M, "heading_deg": round(math.degrees(HEADING_NOISE_RAD), 4)},
 }
 """What log.toml states of the pictures: no effect adjusts the exposure from one to the next."""
 Table = tuple[str, Mapping[str, tuple[Floats, Floats]]]
@@ -188,7 +187,10 @@ def _film_drive(family: driving.LaneFollowing, instance: driving.Instance, lap: 
     own = int(random.integers(2**32))
     noise = {"position_noise_m": family.position_noise_m, "heading_noise_deg": family.heading_noise_deg}
     start = np.array(driving.start_pose(family.map, lap.start, seed=own, **noise))
-    start = _in_other_lane(family.map, start) if lap.turned else start
+    if lap.turned:  # in the middle of the lane that it then looks along
+        heading = start[2] + math.pi
+        other = driving.lane_pose(family.map, start[:2], heading)
+        start = np.array((*driving.lane_point(family.map, other.counter_clockwise, other.along), heading))
     seconds = max(SHORTEST_S, lap.frames / FRAMES_HZ)
     course = driving.Course(start, seconds, own, functools.partial(driving.off_map, family.map))
     expert = driving.Expert(family.map, *instance.robot.expert_figures(), seed=own)
@@ -201,24 +203,15 @@ def _film_drive(family: driving.LaneFollowing, instance: driving.Instance, lap: 
     return FilmedDrive(episode, times, np.stack([driven.memory.pictures[step] for step in steps]))
 
 
-def _in_other_lane(road: driving.Road, pose: Floats) -> Floats:
-    """The pose turned round, in the middle of the lane that it then looks along."""
-    heading = pose[2] + math.pi
-    other = driving.lane_pose(road, pose[:2], heading)
-    return np.array((*driving.lane_point(road, other.counter_clockwise, other.along), heading))
-
-
 def _instants(instance: driving.Instance, driven: driving.Drive, lap: _Lap) -> tuple[list[int], Floats]:
     """Control steps at which the newest picture is another one, spread over the drive, and when it was exposed [s]."""
     hold, every = (round(driving.TICK_HZ / instance.robot.figures[rate]) for rate in ("control_rate", "camera_rate"))
     finished = np.arange(len(driven.commands)) * hold // every * every
     fresh = np.flatnonzero(np.diff(finished, prepend=0) > 0)
     if len(fresh) < lap.frames:
-        seconds = len(driven.commands) * hold / driving.TICK_HZ
-        raise EpisodeError(
-            f"lane drive from start {lap.start} ended after {seconds:.2f} s with {len(fresh)} of {lap.frames} "
-            "pictures; record fewer frames, or correct the model"
-        )
+        ended = f"ended after {len(driven.commands) * hold / driving.TICK_HZ:.2f} s"
+        problem = f"lane drive from start {lap.start} {ended} with {len(fresh)} of {lap.frames} pictures"
+        raise EpisodeError(f"{problem}; record fewer frames, or correct the model")
     steps = fresh[(np.arange(lap.frames) + 1) * len(fresh) // lap.frames - 1]
     # The middle of a picture's exposure, that of its middle row, is half of both before it is finished.
     lasting = {Blur.name: "blur", RollingShutter.name: "readout"}

@@ -4,6 +4,7 @@
 none of which is imported before it is named); `ask` calls it, and tells what it raised and where.
 """
 
+import functools
 import importlib
 import inspect
 import os
@@ -193,18 +194,15 @@ def _attribute(name: str, kind: str, beside: Path | None) -> Any:
 def _imported(name: str, kind: str, module: str, beside: Path | None) -> ModuleType:
     if beside is None:
         check_runs(module)
+    found = importlib.import_module if beside is None else functools.partial(import_beside, folder=beside)
     try:
-        return importlib.import_module(module) if beside is None else import_beside(module, beside)
-    except ProxytuneError:
-        raise
-    except BaseException as problem:
-        if is_users(problem):
-            raise
+        return ask(f"{kind} '{name}': importing {module}", lambda: found(module))
+    except ExtensionError as refused:
+        problem = refused.__cause__
         if isinstance(problem, ModuleNotFoundError) and f"{module}.".startswith(f"{problem.name}."):
             where = "installed" if beside is None else f"in {beside.absolute()} or installed"
             raise ExtensionError(f"{kind} '{name}': no module '{problem.name}' {where}; check the name") from None
-        described = f"{describe(problem)}{place_of(problem)}"
-        raise ExtensionError(f"{kind} '{name}': importing {module} raised {described}; correct it") from problem
+        raise
 
 
 def _plugin(name: str, kind: str, installed: Mapping[str, Any], shipped: Mapping[str, Any]) -> Any:
@@ -217,6 +215,5 @@ def _plugin(name: str, kind: str, installed: Mapping[str, Any], shipped: Mapping
     except BaseException as problem:
         if is_users(problem):
             raise
-        raise ExtensionError(
-            f"{kind} '{name}': its plug-in {installed[name].value} raised {describe(problem)}; correct or uninstall it"
-        ) from problem
+        raised = f"its plug-in {installed[name].value} raised {describe(problem)}"
+        raise ExtensionError(f"{kind} '{name}': {raised}; correct or uninstall it") from problem

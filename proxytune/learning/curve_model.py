@@ -229,14 +229,10 @@ DOUBT = 2.5
 
 @dataclass(frozen=True)
 class CurveDraws:
-    """Mean curves drawn from their posterior, all proxies' together.
+    """Mean scores by name of the curve, (draws, counts) each, drawn from their posterior at counts of target samples.
 
-    Attributes:
-        counts: Numbers of target samples (counts,), rising from 0.
-        scores: Mean scores by name of the curve, (draws, counts) each; NaN before anything can have been learnt.
-        monotone: Whether the data allow a curve to rise only, by name; then it is drawn so.
-        model: What they are drawn from; its curves are numbered in the order of `scores`.
-        first: The smallest number of target samples after which something has been learnt.
+    They are NaN before anything can have been learnt, as it has after `first` samples. Where the data allow a curve to
+    rise only it is drawn so (`monotone`). The model that they are drawn from numbers its curves in their order.
     """
 
     counts: Floats

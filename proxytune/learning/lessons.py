@@ -24,7 +24,6 @@ from proxytune.errors import EpisodeError, InputError, LearnerError, StoreError
 from proxytune.files import draft_of
 from proxytune.identity import digest, meaning_of
 from proxytune.learning.learner import Learner
-from proxytune.learning.plv import general_plv
 from proxytune.lineage import named
 from proxytune.seeds import lesson_seeds
 from proxytune.settings import Section
@@ -204,9 +203,8 @@ def examine_policy(classroom: Classroom, episodes: Sequence[Episode], policy: Po
     else:
         scores = list(together(episodes, policy))
     if len(scores) != len(episodes):
-        raise EpisodeError(
-            f"examine_together gave {len(scores)} scores for {len(episodes)} episodes; give each its own"
-        )
+        problem = f"examine_together gave {len(scores)} scores for {len(episodes)} episodes"
+        raise EpisodeError(f"{problem}; give each its own")
     for start, score in enumerate(scores):
         if not math.isfinite(score):
             raise EpisodeError(f"the examination from start {start} gave {score!r}; give a finite score")
@@ -220,10 +218,8 @@ def mix_samples(new: Demonstration, earlier: Demonstration, share: float) -> Dem
     """
     wanted = min(len(earlier.commands), round(len(new.commands) * share / (1.0 - share)))
     rows = np.linspace(0, len(earlier.commands) - 1, wanted).round().astype(int)
-    return Demonstration(
-        np.concatenate((new.observations, earlier.observations[rows])),
-        np.concatenate((new.commands, earlier.commands[rows])),
-    )
+    observations = np.concatenate((new.observations, earlier.observations[rows]))
+    return Demonstration(observations, np.concatenate((new.commands, earlier.commands[rows])))
 
 
 KEYS = ("off_policy", "on_policy", "label")
@@ -263,7 +259,10 @@ def split_samples(count: Floats | float, expert_drives: float) -> tuple[Floats, 
 
 
 def cost_saved(costs: Costs, *, without: tuple[Floats, Floats], with_proxy: tuple[Floats, Floats]) -> Floats:
-    """PLV in cost: what on- and off-policy target samples cost without a proxy, less those needed with it."""
+    """PLV in cost (eq. 6, as we read it): the price of on- and off-policy target samples that a proxy saves.
+
+    With an off-policy cost of 1, and without on-policy samples, it is eq. 5.
+    """
 
     def with_a_price(samples: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
         """Samples without those that cost nothing, of which there may be infinitely many."""
@@ -271,8 +270,8 @@ def cost_saved(costs: Costs, *, without: tuple[Floats, Floats], with_proxy: tupl
         return on, off
 
     cost_on, cost_off = costs.per_sample
-    paid, paid_with = with_a_price(without), with_a_price(with_proxy)
-    return general_plv(without=paid, with_proxy=paid_with, cost_on=cost_on, cost_off=cost_off)  # eq. (6)
+    (on, off), (on_with, off_with) = with_a_price(without), with_a_price(with_proxy)
+    return cost_on * (on - on_with) + cost_off * (off - off_with)  # eq. (6)
 
 
 def learner_identity(learner: Learner) -> str:

@@ -1,4 +1,4 @@
-"""Proxy learning value: how many target samples a proxy saves (Courchesne et al. 2021, equations 5 and 6).
+"""Proxy learning value: how many target samples a proxy saves (Courchesne et al. 2021, equation 5).
 
 With η the target samples that a learner needs to converge, without a proxy (∅) and after the proxy S,
 
@@ -13,10 +13,9 @@ is what others found of proxies of the same names, to stand beside what is measu
 from collections import Counter
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, TypeVar
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from proxytune.arrays import Floats
 from proxytune.learning.curve_model import POSTERIOR_DRAWS, CurveDraws, LearningCurve, crossing, doublings, draw_curves
@@ -27,7 +26,6 @@ NONE = "none"
 LEVELS = (0.025, 0.975)
 """Ends of a 95 % interval, as quantiles of draws."""
 ROUNDING = 1e-9
-Samples = TypeVar("Samples", float, Floats)
 
 
 @dataclass(frozen=True)
@@ -116,25 +114,6 @@ class SampleNeeds:
         return float(self.draws.counts[-1])
 
 
-def plv(*, without: Samples, with_proxy: Samples) -> Samples:
-    """PLV (eq. 5): target samples needed without the proxy, less those needed with it."""
-    return without - with_proxy  # eq. (5)
-
-
-def general_plv(
-    *,
-    without: tuple[Samples, Samples],
-    with_proxy: tuple[Samples, Samples],
-    cost_on: float = 1.0,
-    cost_off: float = 1.0,
-) -> Samples:
-    """PLV where samples gathered by the learner itself cost otherwise than an expert's (eq. 6, as we read it).
-
-    Samples needed are η_on and η_off; with on-policy samples none and an off-policy cost of 1 it is eq. 5.
-    """
-    return cost_on * (without[0] - with_proxy[0]) + cost_off * (without[1] - with_proxy[1])  # eq. (6)
-
-
 def sample_needs(
     curves: Mapping[str, LearningCurve],
     *,
@@ -193,7 +172,7 @@ def samples_needed(needs: SampleNeeds, name: str) -> LearningEstimate:
 
 def more_needed(needs: SampleNeeds, *, more: str, less: str) -> LearningEstimate:
     """The target samples that one learner needs more than another, with the 95 % interval."""
-    return estimate_figure(lambda one, other: plv(without=one, with_proxy=other), needs, more=more, less=less)
+    return estimate_figure(lambda one, other: one - other, needs, more=more, less=less)  # eq. (5)
 
 
 def estimate_figure(
@@ -269,16 +248,6 @@ class AdaptiveDesign:
     batch: int
 
 
-@dataclass(frozen=True)
-class _Cells:
-    """Places for an examination: curve by number and name, count, and drawn mean scores (draws, cells)."""
-
-    number: NDArray[np.intp]
-    name: tuple[str, ...]
-    count: NDArray[np.intp]
-    drawn: Floats
-
-
 def curves_of(counts: Sequence[int], scores: ExaminationScores) -> dict[str, LearningCurve]:
     """Scores as learning curves, by name, each over the grid of counts and what was examined between these."""
     return {name: _curve(counts, name, scores) for name in dict.fromkeys(one.curve for one in scores)}
@@ -317,14 +286,15 @@ def next_examinations(needs: SampleNeeds, names: Sequence[str], design: Adaptive
     one, it is how many samples are needed without a proxy that is to be known. There are fewer than a batch where every
     repetition of every count has been examined.
     """
-    cells = _cells(needs, names, design)
+    cells, drawn = _cells(needs, names, design)
     # What is not reached is taken as some way beyond the grid.
     needed = {name: np.minimum(samples, BEYOND * needs.last) for name, samples in needs.needed.items()}
     alone = needed[NONE]
     wanted = np.column_stack([alone - needed[name] for name in names if name != NONE] or [alone])
     targets = wanted.shape[1]
-    joint = np.cov(np.column_stack((wanted, cells.drawn)), rowvar=False)
-    noise = needs.draws.model.noise_at(cells.number, doublings(cells.count.astype(float), needs.draws.first))
+    joint = np.cov(np.column_stack((wanted, drawn)), rowvar=False)
+    numbers, counts = np.array([(number, count) for number, _, count in cells]).T
+    noise = needs.draws.model.noise_at(numbers, doublings(counts.astype(float), needs.draws.first))
     done = {
         Examination(name, int(repetition), curve.counts[place])
         for name, curve in needs.curves.items()
@@ -334,7 +304,7 @@ def next_examinations(needs: SampleNeeds, names: Sequence[str], design: Adaptive
     while len(chosen) < design.batch:
         tells = np.sum(joint[:targets, targets:] ** 2, axis=0) / (np.diag(joint)[targets:] + noise)
         ordered = np.argsort(-tells, kind="stable").tolist()
-        free = ((cell, _next_of(cells, cell, done, design)) for cell in ordered)
+        free = ((cell, _next_of(cells[cell], done, design)) for cell in ordered)
         best, examination = next(((cell, one) for cell, one in free if one), (0, None))
         if examination is None:
             break
@@ -345,8 +315,10 @@ def next_examinations(needs: SampleNeeds, names: Sequence[str], design: Adaptive
     return chosen
 
 
-def _cells(needs: SampleNeeds, names: Collection[str], design: AdaptiveDesign) -> _Cells:
-    """Every place of the drawn curves at which somebody may be examined."""
+def _cells(
+    needs: SampleNeeds, names: Collection[str], design: AdaptiveDesign
+) -> tuple[list[tuple[int, str, int]], Floats]:
+    """All that may be examined: curve by number and name, and count; and the mean scores drawn there (draws, cells)."""
     counts, scores = needs.draws.counts.round().astype(int), needs.draws.scores
     open_ = {
         counts[place]: place
@@ -354,20 +326,19 @@ def _cells(needs: SampleNeeds, names: Collection[str], design: AdaptiveDesign) -
         for place in (*range(0, len(counts) - 1, APART), len(counts) - 1)
         if not place or counts[place] >= design.counts[1]
     }
-    cells = [
+    places = [
         (number, name, place)
         for number, name in enumerate(needs.curves)
         for count, place in open_.items()
         if name in names and (count or name != NONE) and np.isfinite(scores[name][0, place])
     ]
-    drawn = np.column_stack([scores[name][:, place] for _, name, place in cells])
-    at = np.array([place for _, _, place in cells])
-    return _Cells(np.array([number for number, _, _ in cells]), tuple(name for _, name, _ in cells), counts[at], drawn)
+    drawn = np.column_stack([scores[name][:, place] for _, name, place in places])
+    return [(number, name, int(counts[place])) for number, name, place in places], drawn
 
 
-def _next_of(cells: _Cells, cell: int, done: Collection[Examination], design: AdaptiveDesign) -> Examination | None:
+def _next_of(cell: tuple[int, str, int], done: Collection[Examination], design: AdaptiveDesign) -> Examination | None:
     """The examination here in the repetition in which this learner has been examined least; None if all are done."""
-    name, count = cells.name[cell], int(cells.count[cell])
+    _, name, count = cell
     often = Counter(one.repetition for one in done if one.curve == name)
     possible = (Examination(name, number, count) for number in range(design.repetitions))
     free = [one for one in possible if one not in done]

@@ -104,7 +104,10 @@ def read_teaching(section: Section) -> TeachingSettings | None:
     target = section.file("target")
     if not target.is_file():
         raise section.error("target", f"no such file: {target}; give the target's model.toml")
-    proxies = _proxies(section.section("proxies"))
+    named = section.section("proxies")
+    if NONE in named.values:
+        raise named.error(NONE, "is what learning without a proxy is called; choose another name")
+    proxies = {name: _distribution(named.section(name)) for name in named.values}
     value = section.values.get("narrow", False)
     if not isinstance(value, bool):
         raise section.error("narrow", f"must be true or false, got {value!r}")
@@ -154,12 +157,6 @@ def _widths(section: Section) -> Mapping[str, tuple[float, float]]:
         if low < 0.0:
             raise section.error(name, f"a width is at least 0, got {low:g}")
     return widths
-
-
-def _proxies(section: Section) -> Mapping[str, Distribution]:
-    if NONE in section.values:
-        raise section.error(NONE, "is what learning without a proxy is called; choose another name")
-    return {name: _distribution(section.section(name)) for name in section.values}
 
 
 def _distribution(section: Section) -> Distribution:

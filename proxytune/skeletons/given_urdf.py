@@ -8,19 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from proxytune.driving import (
-    ACROSS,
-    AXLES,
-    STEERS,
-    Body,
-    add_little_mass,
-    link_pose,
-    origin_of,
-    parse_urdf,
-    read_body,
-    sound_urdf,
-    wheelbase_of,
-)
+from proxytune import driving
 from proxytune.errors import InputError
 from proxytune.skeletons.writing import Skeleton, check_figures, completed, robot_text, then
 
@@ -41,13 +29,15 @@ def robot_from_urdf(name: str, path: Path, figures: Mapping[str, float], drive: 
         InputError: If its wheels cannot be told, or a number in it is none.
     """
     check_figures(figures)
-    root = parse_urdf(path)
-    with sound_urdf(path):
+    root = driving.parse_urdf(path)
+    with driving.sound_urdf(path):
         _drop_empty_roots(root, path)
         named = tuple(_name_joints(root, path)) if drive == "ackermann" else ()
-        body = read_body(root, path)
-        radius = _radius(body, figures, path)
-        base = {"wheelbase": wheelbase_of(root, body, path)} if drive == "ackermann" else {}
+        body = driving.read_body(root, path)
+        radius = body.left.radius_m or body.right.radius_m or figures.get("wheel_radius")
+        if not radius:
+            raise InputError(f"{path}: its wheels are meshes; state their radius: --figures wheel_radius=METRES")
+        base = {"wheelbase": driving.wheelbase_of(root, body, path)} if drive == "ackermann" else {}
         notes = (*named, *_conform(root, body, radius))
     read = {name: value for name, value in _figures(body, radius).items() if name in WHEELS or name not in figures}
     read |= base
@@ -63,22 +53,21 @@ def robot_from_urdf(name: str, path: Path, figures: Mapping[str, float], drive: 
 def _name_joints(root: ET.Element, path: Path) -> Iterator[str]:
     """Name the joints of a car as the bullet plant calls them; says what was changed."""
     joints = [joint for joint in root.iter("joint") if joint.get("type") in ("revolute", "continuous")]
-    upright = [joint for joint in joints if abs(_axis(root, joint)[2]) > ACROSS]
+    upright = [joint for joint in joints if abs(_axis(root, joint)[2]) > driving.ACROSS]
     front = {link for joint in upright for link in _below(root, _child(joint))}
-    rear = [joint for joint in joints if abs(_axis(root, joint)[1]) > ACROSS and _child(joint) not in front]
-    for what, found, names in (("steer", upright, STEERS), ("are driven, behind", rear, AXLES)):
+    rear = [joint for joint in joints if abs(_axis(root, joint)[1]) > driving.ACROSS and _child(joint) not in front]
+    for what, found, names in (("steer", upright, driving.STEERS), ("are driven, behind", rear, driving.AXLES)):
         pair = [one for one in found if one.get("name") in names] or found
         if len(pair) != 2:
             told = ", ".join(one.get("name", "") for one in pair) or "none"
-            raise InputError(
-                f"{path}: a car needs two joints that {what}, found {told}; call them {' and '.join(names)}"
-            )
-        pair.sort(key=lambda joint: -link_pose(root, _child(joint))[1, 3])
+            problem = f"{path}: a car needs two joints that {what}, found {told}"
+            raise InputError(f"{problem}; call them {' and '.join(names)}")
+        pair.sort(key=lambda joint: -driving.link_pose(root, _child(joint))[1, 3])
         for joint, name in zip(pair, names, strict=True):
             if joint.get("name") != name:
                 yield f"joint {joint.get('name')} is now called {name}"
             joint.set("name", name)
-            joint.set("type", "revolute" if names is STEERS else "continuous")
+            joint.set("type", "revolute" if names is driving.STEERS else "continuous")
 
 
 def _child(joint: ET.Element) -> str:
@@ -99,18 +88,11 @@ def _axis(root: ET.Element, joint: ET.Element) -> NDArray[np.float64]:
     axis = joint.find("axis")
     said = axis.get("xyz", "1 0 0") if axis is not None else "1 0 0"
     direction = np.array([float(value) for value in said.split()])
-    turned: NDArray[np.float64] = link_pose(root, _child(joint))[:3, :3] @ (direction / np.linalg.norm(direction))
-    return turned
+    turned = driving.link_pose(root, _child(joint))[:3, :3]
+    return np.asarray(turned @ (direction / np.linalg.norm(direction)))
 
 
-def _radius(body: Body, figures: Mapping[str, float], path: Path) -> float:
-    radius = body.left.radius_m or body.right.radius_m or figures.get("wheel_radius")
-    if not radius:
-        raise InputError(f"{path}: its wheels are meshes; state their radius: --figures wheel_radius=METRES")
-    return radius
-
-
-def _figures(body: Body, radius: float) -> dict[str, float]:
+def _figures(body: driving.Body, radius: float) -> dict[str, float]:
     """The figures that a URDF states; the camera's from its pose, the lens looking along its x axis."""
     read = {"wheel_radius": radius, "wheel_distance": body.wheel_distance}
     read |= {"mass": body.mass_kg} if body.mass_kg > 0.0 else {}
@@ -123,15 +105,15 @@ def _figures(body: Body, radius: float) -> dict[str, float]:
     return read | ({"camera_forward": forward, "camera_height": height, "camera_pitch": pitch} if height > 0.0 else {})
 
 
-def _origin(body: Body, radius: float) -> NDArray[np.float64]:
+def _origin(body: driving.Body, radius: float) -> NDArray[np.float64]:
     """The middle of the axle, on the floor, in the root link's frame (3,) [m]."""
     origin: NDArray[np.float64] = (body.left.centre + body.right.centre) / 2.0 - (0.0, 0.0, radius)
     return origin
 
 
-def _conform(root: ET.Element, body: Body, radius: float) -> Iterator[str]:
+def _conform(root: ET.Element, body: driving.Body, radius: float) -> Iterator[str]:
     """Make the URDF what the bullet plant drives, its axles named and pointing to the left; says what was changed."""
-    for wheel, name in zip((body.left, body.right), AXLES, strict=True):
+    for wheel, name in zip((body.left, body.right), driving.AXLES, strict=True):
         joint = next(one for one in root.iter("joint") if one.get("name") == wheel.joint)
         joint.set("name", name)
         axis = joint.find("axis")
@@ -157,7 +139,7 @@ def _complete_links(root: ET.Element) -> Iterator[str]:
         yield f"{len(meshes)} meshes of its looks are left out: nothing draws them"
     without = [link for link in links if link.find("inertial") is None]
     for link in without:
-        add_little_mass(link)
+        driving.add_little_mass(link)
     if without:
         yield f"links without mass have 1 g now: {', '.join(link.get('name', '') for link in without)}"
     if root.find("link/collision/geometry/mesh") is not None:
@@ -174,7 +156,7 @@ def _drop_empty_roots(root: ET.Element, path: Path) -> None:
         below = [one for one in root.findall("joint") if _parent(one) == link.get("name")]
         if link.find("inertial") is not None or len(below) != 1 or below[0].get("type") != "fixed":
             return
-        if not np.allclose(origin_of(below[0])[:3, :3], np.eye(3)):
+        if not np.allclose(driving.origin_of(below[0])[:3, :3], np.eye(3)):
             raise InputError(f"{path}: joint '{below[0].get('name')}' turns the robot; write its URDF with x forward")
         root.remove(link)
         root.remove(below[0])

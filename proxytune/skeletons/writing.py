@@ -137,13 +137,10 @@ CAR_GUESSES: Mapping[str, tuple[float, str]] = MappingProxyType(
     }
 )
 """The same of a car, where it differs."""
-EIGHT = (
-    *("wheelbase", "wheel_angle", "wheel_radius", "wheel_distance", "full_speed", "motor_time_constant"),
-    *("camera_height", "camera_pitch"),
-)
-"""What a car's body and model are made of."""
 SIX = ("wheel_radius", "wheel_distance", "full_speed", "motor_time_constant", "camera_height", "camera_pitch")
 """What a skeleton's body and model are made of; the rest can wait."""
+EIGHT = ("wheelbase", "wheel_angle", *SIX)
+"""What a car's body and model are made of."""
 HIGHEST = {
     "motor_time_constant": PARAMETERS["motor_lag.time_constant"].high,
     "camera_pitch": PARAMETERS["camera_pitch"].high,
@@ -211,13 +208,9 @@ def completed(figures: Mapping[str, float], drive: str = "differential") -> dict
 def robot_text(
     name: str, values: Mapping[str, float], known: Mapping[str, Mapping[str, float]], drive: str = "differential"
 ) -> str:
-    """A robot.toml: the figures that matter most first; what is not known is marked EDIT.
+    """A robot.toml with the values of every figure, those that matter most first; what is not known is marked EDIT.
 
-    Args:
-        name: Of the robot.
-        values: Every figure, in the units of a robot.toml.
-        known: Source to the figures that come from it; the first source that has a figure is named.
-        drive: How it drives.
+    Of the sources of known figures the first that has one is named.
     """
     rows, guesses = [], _guesses(drive)
     template, first = ("robot.toml.txt", SIX) if drive == "differential" else ("car.toml.txt", EIGHT)

@@ -6,6 +6,7 @@ by several processes (`prepare_points`, `score_points`); one that hangs or ends 
 """
 
 import functools
+import itertools
 import shutil
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager, suppress
@@ -140,26 +141,14 @@ def examine_curves(
     watcher: Watcher,
     known: learning.ExaminationScores | None = None,
 ) -> dict[learning.Examination, float]:
-    """Examine learners of these proxies; what is cached is not made again.
+    """Examine learners of these proxies, None of the one without; what is cached is not made again.
 
-    Args:
-        setup: Where they learn.
-        proxies: p(θ) by name; None of the learner without a proxy.
-        jobs: How many processes there are.
-        watcher: Hears of every examination.
-        known: Scores of learners that are not examined further, the one without a proxy among them.
-
-    Returns:
-        The known scores and the new ones.
+    The known scores, of learners that are not examined further, are given back with the new ones.
     """
     taught, scores = setup.settings, dict(known or {})
     if taught.examinations is None:
-        grid = [
-            learning.Examination(name, repetition, count)
-            for name in proxies
-            for repetition in range(taught.seeds)
-            for count in taught.target_samples
-        ]
+        every = itertools.product(proxies, range(taught.seeds), taught.target_samples)
+        grid = list(itertools.starmap(learning.Examination, every))
         return {**scores, **_examine(setup, proxies, grid, jobs, watcher)}
     wanted = len(scores) + count_examinations(taught, len(proxies))
     design = learning.AdaptiveDesign(taught.target_samples, taught.seeds, BATCH)

@@ -40,9 +40,7 @@ DRIVING = {
 def watching(what: str, timeout_s: float | None = None) -> Iterator[None]:
     """Raise in one line what code that is not ours raises meanwhile, and end what takes longer than it may.
 
-    Args:
-        what: What is under way.
-        timeout_s: How long it may take [s], where processes may be ended (`limited`).
+    It may take `timeout_s` [s], where processes may be ended (`limited`).
     """
     try:
         with limited(what, timeout_s):
@@ -60,10 +58,7 @@ def watching(what: str, timeout_s: float | None = None) -> Iterator[None]:
 class Supervised:
     """A classroom of which each lesson and examination is named where it fails, and ended where it takes too long.
 
-    Attributes:
-        room: The classroom.
-        domain: What it is, "proxy" or "target".
-        timeout_s: How long an episode may take [s]; None for as long as it takes.
+    It is the "proxy" or the "target" domain; an episode may take `timeout_s` [s], or as long as it takes.
     """
 
     room: Any
@@ -100,17 +95,10 @@ class Supervised:
 
 @dataclass(frozen=True)
 class Lessons:
-    """The lessons in one domain, in rounds: one where the expert drives, several where the learner does.
+    """The lessons in a domain of this identity, in rounds: one where the expert drives, several where the learner does.
 
-    Attributes:
-        room: The domain family.
-        domain: Its identity.
-        where: p(θ), drawn anew for every lesson.
-        seed: Of the lessons.
-        lesson_s: How long each takes [s].
-        grid: Number of samples after each round, rising.
-        by: Who drives. LEARNER: in each round as it has learnt to in those before, as long as there is nothing, the
-            expert. EXPERT: there is one round.
+    Each takes `lesson_s` [s] at a θ of its own, `where` being p(θ); `grid` is the number of samples after each round. A
+    learner drives in each round as it has learnt to in those before; as long as there is nothing, the expert does.
     """
 
     room: Classroom
@@ -154,13 +142,8 @@ class Lessons:
 class Stage:
     """A stage of learning: what a learner learns in one domain, after what it has learnt in another.
 
-    Facts of what comes before enter those of what comes after as their digest: each key is short and complete.
-
-    Attributes:
-        setup: Who learns, what is rehearsed, and where all is kept.
-        seed: Of the learner's weights and of its samples' order.
-        lessons: From what.
-        before: The stage from whose weights it goes on; None from scratch.
+    Facts of what comes before enter those of what comes after as their digest: each key is short and complete. The seed
+    is of the learner's weights and of its samples' order; without a stage `before` it begins from scratch.
     """
 
     setup: "TeachingSetup"
@@ -236,13 +219,9 @@ PROXY_ROUNDS = 4
 
 @dataclass(frozen=True)
 class CurvePoint:
-    """One point of a learning curve under one seed.
+    """One point of a learning curve under one seed: after p(θ) of a proxy, if one taught first, so many target samples.
 
-    Attributes:
-        name: What the proxy is called, for error lines only.
-        proxy: p(θ) of the proxy that taught first, None without one.
-        repetition: Which repetition, from 0: learners with and without a proxy share its target samples.
-        count: How many target samples come after that.
+    The proxy's name is for error lines only. Learners with and without a proxy share a repetition's target samples.
     """
 
     name: str
@@ -253,18 +232,10 @@ class CurvePoint:
 
 @dataclass(frozen=True)
 class TeachingSetup:
-    """A learning experiment ready to run: both domains, the learner, how much of what, and the cache.
+    """A learning experiment ready to run: both domain families, the learner, how much of what, and the cache of it all.
 
-    Attributes:
-        proxy: The proxy's domain family.
-        target: The target's.
-        learner: What is trained.
-        learner_identity: A digest of its code and settings.
-        settings: Numbers of samples, seeds and seconds.
-        seed: The study's.
-        starts: Number of starts in an examination.
-        cache: Where samples, weights and scores are kept.
-        timeout_s: How long an episode of a lesson or an examination may take [s]; None for as long as it takes.
+    `learner_identity` is a digest of the learner's code and settings; the seed is the study's, and the starts are those
+    of an examination. An episode of it or of a lesson may take `timeout_s` [s], or as long as it takes.
     """
 
     proxy: Classroom

@@ -38,14 +38,9 @@ CLOSER = 2
 def finalists(
     setup: TeachingSetup, settings: StudySettings, space: Space, trials: Sequence[search.Trial], by_prpv: Theta | None
 ) -> dict[str, learning.Distribution]:
-    """The distributions that are worth a closer look, by name; none twice.
+    """The distributions that are worth a closer look after these trials, by name; none twice.
 
-    Args:
-        setup: Of the learning experiment.
-        settings: Of the study, whose whole box is one of the finalists where widths are searched.
-        space: What was searched.
-        trials: Those that have ended.
-        by_prpv: The θ of lowest PRPV, None where that is not known.
+    The θ of lowest PRPV is one where it is known, and the study's whole box where widths are searched.
     """
     if all(trial.score is None for trial in trials):
         return {}
@@ -130,10 +125,8 @@ def why_unknown(needs: learning.SampleNeeds) -> PlvUnknown | None:
         reason = f"teaching.target_samples has no number from 1 to half of {last} that would show a rise towards it"
         return PlvUnknown(reason, f"add numbers between 0 and {last} to teaching.target_samples")
     if not needs.settled:
-        reason = (
-            f"without a proxy the score still rises by more than {tolerance} over the last doubling to {last} samples"
-        )
-        return PlvUnknown(reason, RAISE)
+        rises = f"the score still rises by more than {tolerance} over the last doubling to {last} samples"
+        return PlvUnknown(f"without a proxy {rises}", RAISE)
     if not np.isfinite(np.median(needs.needed[learning.NONE])):
         reason = f"without a proxy the score does not come to {needs.when.threshold:g} within {last} samples"
         return PlvUnknown(reason, f"lower teaching.level, or {RAISE}")

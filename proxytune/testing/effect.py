@@ -31,27 +31,16 @@ PLACES = np.stack([axis for way in WAY for axis in ((way, 0.0), (0.0, way))])
 
 @dataclass(frozen=True)
 class Subject:
-    """An effect class that is put to the test.
-
-    Attributes:
-        kind: Its class.
-        robot: Whose nominal figures it is told.
-        name: What θ calls the effect.
-    """
+    """An effect class that is put to the test, the robot whose nominal figures it is told, and what θ calls it."""
 
     kind: type[Effect]
     robot: Robot
     name: str
 
     @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        """Its parameters."""
-        return self.kind.parameters
-
-    @property
     def neutral(self) -> dict[str, float]:
         """The neutral values, by parameter."""
-        return {parameter.name: parameter.neutral_value(self.robot.figures) for parameter in self.parameters}
+        return {parameter.name: parameter.neutral_value(self.robot.figures) for parameter in self.kind.parameters}
 
     def at(self, values: Mapping[str, float]) -> Effect:
         """The effect with these values, all others neutral."""
@@ -59,7 +48,7 @@ class Subject:
 
     def moved(self, parameter: Parameter, value: float) -> Effect:
         """The effect with one value moved; what only shapes an effect is moved in one that is there."""
-        first = self.parameters[0]
+        first = self.kind.parameters[0]
         usual = first.probes[len(first.probes) // 2] if first.probes else 0.5 * (first.low + first.high)
         return self.at({**({first.name: usual} if parameter.shape else {}), parameter.name: value})
 
@@ -99,31 +88,19 @@ Answer = TypeVar("Answer")
 
 
 def claim(holds: Any, line: str) -> None:
-    """Refuse what does not hold.
-
-    Raises:
-        ConformanceError: With this line.
-    """
+    """Refuse what does not hold, with this line."""
     if not holds:
         raise ConformanceError(line)
 
 
 def claim_members(thing: Any, what: str, members: Iterable[str]) -> None:
-    """Refuse what lacks a member.
-
-    Raises:
-        ConformanceError: With the names of those it lacks.
-    """
+    """Refuse what lacks a member, with the names of those it lacks."""
     lacks = [member for member in members if not hasattr(thing, member)]
     claim(not lacks, f"{what} lacks {', '.join(lacks)}; add what every one of its kind must have")
 
 
 def ask(what: str, question: Callable[[], Answer]) -> Answer:
-    """Ask an extension.
-
-    Raises:
-        ConformanceError: If it raises instead.
-    """
+    """Ask an extension; refused if it raises instead."""
     try:
         return question()
     except ConformanceError:
@@ -163,7 +140,7 @@ def check_effect(effect: type[Effect], *, robot: Robot | None = None, least: flo
 
 def _check(subject: Subject, least: float) -> None:
     _claim_vanishes(subject)
-    for parameter in subject.parameters:
+    for parameter in subject.kind.parameters:
         _claim_moves(subject, parameter, least)
         for value in dict.fromkeys((*parameter.probes, parameter.low, parameter.high)):
             effect = subject.moved(parameter, value)
@@ -191,11 +168,11 @@ def _claim_vanishes(subject: Subject) -> None:
 
 def _of_the_robot(subject: Subject) -> Effect | None:
     """The robot's own effect of this kind, where the neutral value is a nominal figure that it follows in any case."""
-    single = len(subject.parameters) == 1
+    single = len(subject.kind.parameters) == 1
     theta = subject.robot.theta
-    names = {p.name: subject.name if single else f"{subject.name}.{p.name}" for p in subject.parameters}
+    names = {p.name: subject.name if single else f"{subject.name}.{p.name}" for p in subject.kind.parameters}
     own = {parameter: theta[name] for parameter, name in names.items() if name in theta}
-    nominal = any(isinstance(parameter.neutral, str) for parameter in subject.parameters)
+    nominal = any(isinstance(parameter.neutral, str) for parameter in subject.kind.parameters)
     return subject.at(own) if own and nominal and subject.kind.stage is not Stage.CAMERA else None
 
 
@@ -243,10 +220,8 @@ def _claim_chunks(subject: Subject, effect: Effect, what: str) -> None:
         batch = np.stack([subject.signal(seed) for seed in range(6)]).reshape(2, 3, 90, -1)
         alone = np.array([[subject.filtered(effect, one) for one in row] for row in batch])
         together = subject.filtered(effect, batch, (50,))
-        claim(
-            _apart(together, alone) <= 1e-12,
-            f"{what} filters a batch unlike its members; use leading axes (…, time, 2)",
-        )
+        line = f"{what} filters a batch unlike its members; use leading axes (…, time, 2)"
+        claim(_apart(together, alone) <= 1e-12, line)
 
 
 def _claim_nothing_in_place(subject: Subject, effect: Effect, what: str) -> None:
@@ -278,7 +253,7 @@ def _claim_no_drift(subject: Subject) -> None:
 
 
 def _strongest(subject: Subject) -> Effect:
-    first = subject.parameters[0]
+    first = subject.kind.parameters[0]
     return subject.moved(first, first.probes[-1])
 
 

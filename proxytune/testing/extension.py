@@ -14,23 +14,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from proxytune import search
 from proxytune.arrays import Floats
 from proxytune.domain import DomainFamily, Episode, make_episode
 from proxytune.driving import NEEDS, Agent, GroundPlaneCamera, Picture, Robot, draw_floor, read_robot, shipped_map
 from proxytune.errors import EpisodeError, InputError
 from proxytune.running import working
 from proxytune.scores import Metric, ScoreTable
-from proxytune.search import (
-    Engine,
-    Goal,
-    Proposer,
-    Trial,
-    Values,
-    make_proposer,
-    propose_batch,
-    to_unit,
-    why_not_engine,
-)
 from proxytune.space import Interval, Parameter, Space, Theta
 from proxytune.testing.effect import ROBOT, ask, claim, claim_members
 from proxytune.usefulness import ALL, Measure, Measured, assess
@@ -122,20 +112,20 @@ BOX = Space((Interval("delay", 0.0, 0.3), Interval("trim", -0.3, 0.3)))
 NARROW = Space((Interval("mass", 200.0, 2000.0),))
 """A box of a single parameter."""
 INITIAL, BUDGET, SEED, BATCH = 3, 8, 3, 3
-Score = Callable[[Space, Values], float | None]
+Score = Callable[[Space, search.Values], float | None]
 """The score of a point, None where its trial fails."""
 
 
-def _stepped(box: Space, values: Values) -> float | None:
+def _stepped(box: Space, values: search.Values) -> float | None:
     """A score with steps, lowest about a third of the way along each side, as PRPV's are."""
-    return float(np.floor(12.0 * np.abs(to_unit(box, values) - 1.0 / 3.0).sum()))
+    return float(np.floor(12.0 * np.abs(search.to_unit(box, values) - 1.0 / 3.0).sum()))
 
 
-GOAL = Goal((("agent", "score"),), np.zeros(1), np.zeros(1), lambda outcomes: np.asarray(outcomes[..., 0]))
+GOAL = search.Goal((("agent", "score"),), np.zeros(1), np.zeros(1), lambda outcomes: np.asarray(outcomes[..., 0]))
 """An outcome that is the score itself, for an engine that learns from outputs; the target's is 0."""
 
 
-def check_engine(engine: Engine) -> None:
+def check_engine(engine: search.Engine) -> None:
     """Refuse an engine that breaks a promise.
 
     A proposal is a function of box, trials and seed alone: a new proposer says the same, whatever another was asked
@@ -148,41 +138,41 @@ def check_engine(engine: Engine) -> None:
     Raises:
         ConformanceError: With the promise that is broken.
     """
-    claim(isinstance(engine, Engine), f"engine {engine!r} is a {type(engine).__name__}; make it an Engine")
+    claim(isinstance(engine, search.Engine), f"engine {engine!r} is a {type(engine).__name__}; make it an Engine")
     what = f"engine '{engine.name}'"
-    reason = why_not_engine(engine, composed=True)
+    reason = search.why_not_engine(engine, composed=True)
     claim(not reason, f"{what} cannot be used: {reason}")
     scores: tuple[Score, ...] = (
         _stepped,
-        lambda box, values: -float(to_unit(box, values).sum()),  # lowest in a corner
-        lambda box, values: None if to_unit(box, values)[0] > 0.5 else _stepped(box, values),  # half of it fails
+        lambda box, values: -float(search.to_unit(box, values).sum()),  # lowest in a corner
+        lambda box, values: None if search.to_unit(box, values)[0] > 0.5 else _stepped(box, values),  # half of it fails
     )
     for score in scores:
         _check_engine(engine, what, BOX, score)
     _check_engine(engine, what, NARROW, _stepped)
 
 
-def _check_engine(engine: Engine, what: str, box: Space, score: Score) -> None:
-    trials: list[Trial] = []
+def _check_engine(engine: search.Engine, what: str, box: Space, score: Score) -> None:
+    trials: list[search.Trial] = []
     for _ in range(BUDGET):
         values = _proposed(_made(engine, what), what, box, trials)
         found = score(box, values)
-        trials.append(Trial(values, found, None if found is None else (found,)))
+        trials.append(search.Trial(values, found, None if found is None else (found,)))
     used = _made(engine, what)
     for stop in (BUDGET - 1, INITIAL, BUDGET - 2):
         again = _proposed(used, what, box, trials[:stop])
         claim(again == trials[stop].values, f"{what} proposes otherwise when asked again; remember nothing")
-    batch = ask(what, lambda: propose_batch(_made(engine, what), box, trials, SEED, BATCH))
+    batch = ask(what, lambda: search.propose_batch(_made(engine, what), box, trials, SEED, BATCH))
     claim(len(set(batch)) == BATCH, f"{what} proposes {batch} together; points that are pending must not be repeated")
     for values in batch:
         _claim_inside(what, box, values)
 
 
-def _made(engine: Engine, what: str) -> Proposer:
-    return ask(what, lambda: make_proposer(engine, INITIAL, GOAL))
+def _made(engine: search.Engine, what: str) -> search.Proposer:
+    return ask(what, lambda: search.make_proposer(engine, INITIAL, GOAL))
 
 
-def _proposed(proposer: Proposer, what: str, box: Space, trials: Sequence[Trial]) -> Values:
+def _proposed(proposer: search.Proposer, what: str, box: Space, trials: Sequence[search.Trial]) -> search.Values:
     told = list(trials)
     values = ask(what, lambda: proposer.propose(box, told, SEED))
     claim(told == list(trials), f"{what} changes the trials that it is told; copy them first")
@@ -190,7 +180,7 @@ def _proposed(proposer: Proposer, what: str, box: Space, trials: Sequence[Trial]
     return values
 
 
-def _claim_inside(what: str, box: Space, values: Values) -> None:
+def _claim_inside(what: str, box: Space, values: search.Values) -> None:
     sides = [f"{side.name} in [{side.low:g}, {side.high:g}]" for side in box.intervals]
     inside = len(values) == len(sides) and all(i.low <= v <= i.high for i, v in zip(box.intervals, values, strict=True))
     claim(inside, f"{what} proposes {values}; give one value for each of {', '.join(sides)}")
@@ -255,9 +245,8 @@ def _claim_unknown(family: DomainFamily, what: str) -> None:
         return
     except Exception as problem:
         claim(False, f"{what} refuses an unknown agent by {type(problem).__name__}; raise proxytune.InputError")
-    claim(
-        False, f"{what} takes an agent '{NOBODY}'; check_agent must raise proxytune.InputError for what it cannot run"
-    )
+    line = f"takes an agent '{NOBODY}'; check_agent must raise proxytune.InputError for what it cannot run"
+    claim(False, f"{what} {line}")
 
 
 def _scores(family: DomainFamily, what: str, episode: Episode) -> Scores:
@@ -296,10 +285,8 @@ def _claim_elsewhere(family: DomainFamily, what: str, episode: Episode, scores: 
     with working(functools.partial(_answer, copied), [episode, episode], jobs=2) as answers:
         there = list(answers)
     for where, (identity, answered) in (("a copy", _answer(copied, episode)), *(("another process", a) for a in there)):
-        line = (
-            f"has the identity '{identity}' in {where}, '{family.identity}' here; digest what it is made of, no hash()"
-        )
-        claim(identity == family.identity, f"{what} {line}")
+        line = f"has the identity '{identity}' in {where}, '{family.identity}' here"
+        claim(identity == family.identity, f"{what} {line}; digest what it is made of, no hash()")
         claim(answered == scores, f"{what} scores an episode otherwise in {where}; draw from episode.seed alone")
     return None
 
@@ -312,9 +299,8 @@ def _claim_together(family: Any, what: str, agents: Sequence[str]) -> None:
     claim(len(together) == len(episodes), f"{what}: run_many of {len(episodes)} episodes gives {len(together)} results")
     for episode, scores in zip(episodes, together, strict=True):
         same = not isinstance(scores, EpisodeError) and dict(scores) == _scores(family, what, episode)
-        claim(
-            same, f"{what} scores agent '{episode.agent}', start {episode.start} otherwise beside others; mix nothing"
-        )
+        line = f"scores agent '{episode.agent}', start {episode.start} otherwise beside others; mix nothing"
+        claim(same, f"{what} {line}")
 
 
 def _answer(family: DomainFamily, episode: Episode) -> tuple[str, Scores]:
@@ -386,9 +372,8 @@ def _check_means(measure: Measure, what: str) -> None:
 
 
 def _table(seed: int, episodes: int) -> ScoreTable:
-    values = (
-        np.random.default_rng(seed).normal(size=(AGENTS, episodes, len(METRICS))) + np.arange(AGENTS)[:, None, None]
-    )
+    spread = np.random.default_rng(seed).normal(size=(AGENTS, episodes, len(METRICS)))
+    values = spread + np.arange(AGENTS)[:, None, None]
     names = (tuple(f"agent{i}" for i in range(AGENTS)), tuple(map(str, range(episodes))))
     return ScoreTable(*names, tuple(metric.name for metric in METRICS), values)
 

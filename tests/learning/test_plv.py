@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from proxytune.learning import AdaptiveDesign, Examination, LearningCurve, first_examinations, mean_score
-from proxytune.learning.plv import general_plv, more_needed, next_examinations, plv, sample_needs, teaching_value
+from proxytune.learning.plv import more_needed, next_examinations, sample_needs, teaching_value
 
 GRID = (0, 100, 200, 400, 800)
 
@@ -94,8 +94,6 @@ def test_scores_beyond_the_best_are_no_others_and_unit_costs_are_plv():
     needs = sample_needs(lower, best_score=0.0, tolerance=20.0)
     assert -195.0 < needs.when.level < -185.0
     assert 200.0 < teaching_value(needs, proxy="proxy").without.value < 800.0
-    assert general_plv(without=(0.0, 900.0), with_proxy=(0.0, 100.0)) == plv(without=900.0, with_proxy=100.0) == 800.0
-    assert general_plv(without=(10.0, 5.0), with_proxy=(4.0, 1.0), cost_on=2.0, cost_off=3.0) == 24.0
 
 
 SPENDING_GRID = (0, 100, 200, 400, 800, 1600)

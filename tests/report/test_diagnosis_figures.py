@@ -336,7 +336,7 @@ def test_with_nothing_added_there_is_one_model_and_no_effect_and_idle_curves_are
 
 @pytest.mark.slow
 def test_an_unexplained_residual_is_drawn_over_each_signal_that_there_is(diagnosis):
-    assert {group.name for group in signal_groups(diagnosis.found.declared)} <= set(CUE_PANELS)
+    assert {group.name for group, _ in signal_groups(diagnosis.found.declared)} <= set(CUE_PANELS)
     for curve in diagnosis.found.curves:
         figure = effect_curve(without_effects(diagnosis, (curve._replace(gain=50.0),)))
         figure.draw_without_rendering()

@@ -12,21 +12,9 @@ from pathlib import Path
 import numpy as np
 
 from proxytune.diagnosis.answer import Estimate, Progress, verdict
-from proxytune.diagnosis.camera import selection
+from proxytune.diagnosis.camera import error, selection
 from proxytune.diagnosis.camera.appearance import Appearance, changes, look_at
 from proxytune.diagnosis.camera.edges import DISTORTION, MOVING, READOUT, Gathered, Tape, effects_of, gather_views
-from proxytune.diagnosis.camera.error import (
-    MATERIAL,
-    CameraDiagnosis,
-    CameraEffect,
-    Comparison,
-    LaidLine,
-    LaidMap,
-    Weighed,
-    compare_brightness,
-    estimate_of,
-    weigh_effects,
-)
 from proxytune.diagnosis.camera.fitting import CameraFit
 from proxytune.diagnosis.stages import Stages, facts_of
 from proxytune.driving import LINES, Robot
@@ -39,11 +27,11 @@ SURE = 3.0
 WIDTHS = ("white lines", "yellow lines", "yellow dashes")
 
 
-def describe_map(fit: CameraFit) -> LaidMap:
+def describe_map(fit: CameraFit) -> error.LaidMap:
     """Describe how the map was laid, as the fit has it."""
     degrees = np.array((1.0, 1.0, np.degrees(1.0)))
     offsets = zip(("x_m", "y_m", "heading_deg"), fit.state.offset * degrees, fit.offset_sd * degrees, strict=True)
-    offset = {name: estimate_of(value, sd, name.rpartition("_")[-1]) for name, value, sd in offsets}
+    offset = {name: error.estimate_of(value, sd, name.rpartition("_")[-1]) for name, value, sd in offsets}
     stretches = fit.views.markings.stretches
     tape, lines = Tape(stretches), []
     first = tape.size - len(WIDTHS)
@@ -53,14 +41,19 @@ def describe_map(fit: CameraFit) -> LaidMap:
             place = tape.shift(np.array(stretch), np.array(number))
             value, sd = float(fit.state.tape[place]), float(fit.tape_sd[place])
             if abs(value) > SURE * sd:
-                lines.append(LaidLine(name, stretch, value, estimate_of(value, sd, "m").interval))
+                lines.append(error.LaidLine(name, stretch, value, error.estimate_of(value, sd, "m").interval))
     lines.sort(key=lambda line: -abs(line.right_m))
-    return LaidMap(offset, tuple(lines), {name: estimate_of(value, sd, "m") for name, value, sd in widths})
+    return error.LaidMap(offset, tuple(lines), {name: error.estimate_of(value, sd, "m") for name, value, sd in widths})
 
 
 def conclude(
-    gathered: Gathered, weighed: Weighed, look: Appearance, declared: Sequence[str], notes: Sequence[str], seed: int
-) -> CameraDiagnosis:
+    gathered: Gathered,
+    weighed: error.Weighed,
+    look: Appearance,
+    declared: Sequence[str],
+    notes: Sequence[str],
+    seed: int,
+) -> error.CameraDiagnosis:
     """Give the verdict, with everything that it goes by."""
     named = weighed.named
     tuned = tuple(name for name, one in look.figures.items() if effect_of(name) in declared and one.identified)
@@ -74,7 +67,7 @@ def conclude(
     hidden = effects_of(tuple(name for name in (*unseen, *dark) if effect_of(name) not in changed))
     readout = named.full.theta[READOUT]
     stated = readout > 0.0 and READOUT not in named.full.names
-    return CameraDiagnosis(
+    return error.CameraDiagnosis(
         verdict=verdict(is_explained(fields[1], look), named=bool(effects)),
         declared=_estimates(named.declared, declared) | _figures(look, tuned),
         theta=_estimates(named.model, (*declared, *named.effects))
@@ -110,17 +103,17 @@ def _compare_look(
     declared: Sequence[str],
     tuned: Sequence[str],
     seed: int,
-) -> tuple[Comparison, tuple[CameraEffect, ...]]:
+) -> tuple[error.Comparison, tuple[error.CameraEffect, ...]]:
     """Brightness before and after, and the effects added for how pictures look, if the error without is larger."""
     changed = tuple(effect for effect in changes(look) if effect not in declared)
     looks = (look_values(look, tuned), look_values(look, (*tuned, *_names(look, changed))))
-    grey, ratios = compare_brightness(gathered, named, looks, seed)
+    grey, ratios = error.compare_brightness(gathered, named, looks, seed)
     texture = () if look.grain.noise.identified else ("texture of the floor",)
     added = []
     for effect in changed:
-        if effect != "exposure" or ratios[effect] >= MATERIAL:
+        if effect != "exposure" or ratios[effect] >= error.MATERIAL:
             size, rivals = (None, texture) if effect == "image_noise" else (ratios[effect], ())
-            added.append(CameraEffect(effect, _names(look, (effect,)), None, size, rivals))
+            added.append(error.CameraEffect(effect, _names(look, (effect,)), None, size, rivals))
     return grey, tuple(added)
 
 
@@ -129,12 +122,12 @@ def look_values(look: Appearance, names: Sequence[str]) -> dict[str, float]:
     return {name: PARAMETERS[name].clipped(look.figures[name].value) for name in names}
 
 
-def _told(weighed: Weighed, effect: str) -> CameraEffect:
+def _told(weighed: error.Weighed, effect: str) -> error.CameraEffect:
     named = weighed.named
     names = tuple(name for name in named.full.names if effect_of(name) == effect)
     others = {one for rivals in named.rivals for one in rivals} - set(named.effects)
     always = (selection.ALWAYS[effect],) if effect in selection.ALWAYS else ()
-    return CameraEffect(effect, names, weighed.nats[effect], weighed.ratios[effect], (*always, *sorted(others)))
+    return error.CameraEffect(effect, names, weighed.nats[effect], weighed.ratios[effect], (*always, *sorted(others)))
 
 
 def _names(look: Appearance, effects: Sequence[str]) -> tuple[str, ...]:
@@ -149,7 +142,7 @@ def _figures(look: Appearance, names: Sequence[str]) -> dict[str, Estimate]:
 def _estimates(fit: CameraFit, effects: Sequence[str]) -> dict[str, Estimate]:
     parameters = fit.views.optics.robot.catalogue.parameters
     return {
-        name: estimate_of(fit.theta[name], sd, parameters[name].unit)
+        name: error.estimate_of(fit.theta[name], sd, parameters[name].unit)
         for name, sd in zip(fit.names, fit.sd, strict=True)
         if effect_of(name) in effects
     }
@@ -173,16 +166,8 @@ def diagnose_camera(
     seed: int = 1,
     report: Progress = lambda _: None,
     folder: Path | None = None,
-) -> CameraDiagnosis:
-    """Tune what is declared of a camera, find what is missing, and test both on frames kept aside.
-
-    Args:
-        log: With frames.
-        robot: Whose camera took them.
-        declared: Effects whose parameters are tuned in any case; those on motion are left alone.
-        seed: Of the bootstrap.
-        report: Takes a line about each step, as it begins.
-        folder: Where results are kept on the way, so that a diagnosis that was killed goes on; None: nowhere.
+) -> error.CameraDiagnosis:
+    """Tune what is declared of a camera, find what is missing, and test both on frames kept aside, as `diagnose_log`.
 
     Raises:
         LogError: If the frames cannot bear the question: too few markings, or other poses than these.
@@ -197,8 +182,7 @@ def diagnose_camera(
     facts = facts_of(robot, seen, declared, seed) if folder else ""
     keep = Stages(folder, facts, report, robot=robot, gathered=gathered, **vars(views)).keep
     report("fitting the camera")
-    readout_s = stated.readout_s
-    fixed = {} if readout_s is None else {READOUT: readout_s}
+    fixed = {} if stated.readout_s is None else {READOUT: stated.readout_s}
     names = [name for name in views.optics.mounting if not (stated.rectified and name == DISTORTION)]
     names += [name for name in MOVING if views.tracks.moving and name not in fixed]
     unknown = stated.position_m is None or stated.heading_deg is None
@@ -208,7 +192,7 @@ def diagnose_camera(
     own = [effect for effect in declared if effect in effects_of(tuple(names))]
     named = keep("named", lambda: selection.select_camera_effects(full, own))
     report("testing on frames kept aside")
-    weighed = keep("weighed", lambda: weigh_effects(named, seed))
+    weighed = keep("weighed", lambda: error.weigh_effects(named, seed))
     report("looking at brightness and sharpness")
     look = keep("look", lambda: look_at(gathered, weighed.named.model))
     every = (*gathered.notes, *notes)

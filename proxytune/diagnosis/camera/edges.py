@@ -100,13 +100,9 @@ def _edges_of(number: int, white: bool, share: Floats) -> Edges:
     top = (here >= ahead) & (here > behind) & (bend > 1e-9)
     shift = ((ahead - behind) / np.where(top, 2.0 * bend, 1.0))[top]
     column, row, step_right, step_down = column[top], row[top], step_right[top], step_down[top]
-    return Edges(
-        np.full(len(row), number),
-        np.full(len(row), white),
-        column + 0.5 + shift * step_right,
-        row + 0.5 + shift * step_down,
-        np.stack((step_right, step_down), axis=-1).astype(float),
-    )
+    place = column + 0.5 + shift * step_right, row + 0.5 + shift * step_down
+    normal = np.stack((step_right, step_down), axis=-1).astype(float)
+    return Edges(np.full(len(row), number), np.full(len(row), white), *place, normal)
 
 
 WINDOW_S = 0.5
@@ -123,13 +119,8 @@ APART_S = 10.0
 class Tracks:
     """The poses of N frames, and those shortly before and after, on an axis of time on which drives follow each other.
 
-    Attributes:
-        times: Of poses and rates (K,) [s].
-        poses: x, y [m], heading [rad, unwrapped] (K, 3).
-        rates: Of these (K, 3) [m/s, rad/s]; 0 where pictures were taken standing still.
-        instants: When each frame was taken, on the same axis (N,) [s].
-        begins: When the drive of each frame begins, on the same axis (N,) [s].
-        share: How much of the tracker's scatter is left after smoothing.
+    There are K times [s] with poses (K, 3), unwrapped [m, rad], and their rates, 0 where pictures were taken standing
+    still; of each frame when it was taken and when its drive begins (N,) [s]. Smoothing leaves this `share` of scatter.
     """
 
     times: Floats
@@ -145,10 +136,6 @@ class Tracks:
         series = (self.poses.T, self.rates.T)
         poses, rates = (np.stack([np.interp(when, self.times, one) for one in each], axis=-1) for each in series)
         return poses, rates
-
-    def only(self, chosen: NDArray[np.intp]) -> "Tracks":
-        """The tracks of some frames."""
-        return replace(self, instants=self.instants[chosen], begins=self.begins[chosen])
 
     @property
     def moving(self) -> bool:
@@ -300,10 +287,6 @@ class Views:
         """Standard deviations of the tape's errors, in the order of `Tape` [m]."""
         return np.full(Tape(self.markings.stretches).size, max(self.tape_m, LEAST_TAPE_M))
 
-    def with_scatter(self, position_m: float, heading_rad: float) -> "Views":
-        """Replace the scatter of poses."""
-        return replace(self, position_m=position_m, heading_rad=heading_rad)
-
 
 @dataclass(frozen=True)
 class Tape:
@@ -359,17 +342,14 @@ class Gathered:
 
 
 def gather_views(log: Log, frames: Frames, robot: Robot) -> Gathered:
-    """Read a log's frames and find what they show.
-
-    Raises:
-        LogError: If too few show markings.
-    """
+    """Read a log's frames and find what they show; refused if too few show markings."""
     robot.camera_figures()  # Refuses a robot without a camera before anything is read
     road = read_road(frames.road)
     tracks, numbers = track_frames(log, frames)
     most = min(len(numbers), MOST_FRAMES)
     used = np.unique(np.linspace(0, len(numbers) - 1, most).round().astype(np.intp))
-    tracks, numbers = tracks.only(used), numbers[used]
+    tracks = replace(tracks, instants=tracks.instants[used], begins=tracks.begins[used])
+    numbers = numbers[used]
     pictures, swapped = in_rgb(read_pictures(frames, numbers.tolist()))
     edges = find_edges(pictures)
     showing = int((np.bincount(edges.frame, minlength=len(numbers)) >= FEWEST_POINTS).sum())

@@ -14,16 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from proxytune.arrays import Flags, Floats
+from proxytune.diagnosis.camera import model
 from proxytune.diagnosis.camera.edges import MAP_SCATTER, Tape, Views
-from proxytune.diagnosis.camera.model import (
-    Projection,
-    State,
-    camera_slopes,
-    map_slopes,
-    pose_slopes,
-    project,
-    tape_slopes,
-)
 
 EVIDENCE = 0.1
 """Edge points of a picture are not independent: so much of a point's evidence counts."""
@@ -44,7 +36,7 @@ def robust_weight(residual: Floats, scale_px: float) -> Floats:
 
 
 def count_points(
-    views: Views, there: Projection, scale_px: float, frames: Flags | None = None, least: float = LEAST_WEIGHT
+    views: Views, there: model.Projection, scale_px: float, frames: Flags | None = None, least: float = LEAST_WEIGHT
 ) -> Counted:
     """Weigh edge points of some frames by how far they lie from the map's markings; those of least weight are out."""
     valid = there.valid if frames is None else there.valid & frames[views.edges.frame]
@@ -66,10 +58,12 @@ class Marginal(NamedTuple):
     own: Floats
 
 
-def eliminate_poses(views: Views, state: State, there: Projection, points: Counted, columns: Floats) -> Marginal:
+def eliminate_poses(
+    views: Views, state: model.State, there: model.Projection, points: Counted, columns: Floats
+) -> Marginal:
     """Normal equations of these columns (m, columns) of the points that count, poses eliminated under their prior."""
     rows, weight = points
-    problem = Normal(columns, pose_slopes(there)[rows], there.residual[rows], weight)
+    problem = Normal(columns, model.pose_slopes(there)[rows], there.residual[rows], weight)
     return problem.marginal(views.edges.frame[rows], state.poses, views.pose_scatter)
 
 
@@ -133,7 +127,7 @@ class CameraFit:
 
     views: Views
     names: tuple[str, ...]
-    state: State
+    state: model.State
     information: Floats
     tape_sd: Floats
     offset_sd: Floats
@@ -151,7 +145,7 @@ class CameraFit:
 
 
 def fit_camera(
-    views: Views, state: State, names: Sequence[str], scales_px: Sequence[float], frames: Flags | None = None
+    views: Views, state: model.State, names: Sequence[str], scales_px: Sequence[float], frames: Flags | None = None
 ) -> CameraFit:
     """Fit the parameters of these names by Gauss–Newton with a redescending loss, of a scale [pixel] for each step.
 
@@ -161,7 +155,7 @@ def fit_camera(
     camera_precision = _precisions(views, names)
     precision = np.concatenate((camera_precision, MAP_SCATTER**-2.0, views.tape_scatter**-2.0))
     for scale in scales_px:
-        there = project(views, state)
+        there = model.project(views, state)
         points = count_points(views, there, scale, frames)
         columns = common_slopes(views, state, there, names)[points.rows]
         matrix, right, inverse, coupling, own = eliminate_poses(views, state, there, points, columns)
@@ -174,7 +168,7 @@ def fit_camera(
             most = LARGEST_STEP * optics.spread(name)
             theta[name] = optics.clipped(name, theta[name] + float(np.clip(by, -most, most)))
         offset, tape = state.offset + common[first : first + 3], state.tape + common[first + 3 :]
-        state = State(theta, tape, offset, state.poses + (-own - np.einsum("fij,j->fi", coupling, common)))
+        state = model.State(theta, tape, offset, state.poses + (-own - np.einsum("fij,j->fi", coupling, common)))
     across = matrix[:first, first:]
     information = eliminate(matrix[:first, :first], across, matrix[first:, first:], across.T)
     sd = np.sqrt(np.diag(np.linalg.inv(matrix)))[first:]
@@ -182,14 +176,14 @@ def fit_camera(
     return CameraFit(views, names, state, information - np.diag(camera_precision), sd[3:], sd[:3], pose_sd)
 
 
-def common_slopes(views: Views, state: State, there: Projection, names: tuple[str, ...]) -> Floats:
+def common_slopes(views: Views, state: model.State, there: model.Projection, names: tuple[str, ...]) -> Floats:
     """Slopes of the residuals by camera, map and tape (n, names + 3 + tape)."""
     first = len(names) + 3
     columns = np.zeros((len(there.residual), first + Tape(views.markings.stretches).size))
-    columns[:, : len(names)] = camera_slopes(views, state, there, names)
-    columns[:, len(names) : first] = map_slopes(views, state, there)
+    columns[:, : len(names)] = model.camera_slopes(views, state, there, names)
+    columns[:, len(names) : first] = model.map_slopes(views, state, there)
     rows = np.arange(len(columns))
-    for place, slope in tape_slopes(views, there):
+    for place, slope in model.tape_slopes(views, there):
         columns[rows, first + place] += slope
     return columns
 

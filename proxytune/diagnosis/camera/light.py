@@ -66,10 +66,6 @@ class Light:
     vignetting: Fitted
     levels: Floats
 
-    def only(self, frames: NDArray[np.intp]) -> "Light":
-        """The light of some frames."""
-        return replace(self, levels=self.levels[frames])
-
     def shine(self, predicted: NDArray[Any]) -> NDArray[np.float32]:
         """Give what a camera of this light logs of drawn frames (N, rows, columns[, colours]), before it is rounded."""
         shape = (*predicted.shape[1:3], *(1,) * (predicted.ndim - 3))
@@ -268,7 +264,8 @@ def find_blemishes(measured: Pictures, predicted: NDArray[Any], floor: Flags, li
     left = _against_usual(contrast)
     hidden = (left + SURE * error < HIDDEN) & (_against_usual(variation) < SUBDUED)
     for third in np.array_split(np.arange(len(measured)), PARTS):
-        own, _, spread = _contrast(measured[third], predicted[third], floor, light.only(third), FEWEST_FRAMES // PARTS)
+        here = replace(light, levels=light.levels[third])
+        own, _, spread = _contrast(measured[third], predicted[third], floor, here, FEWEST_FRAMES // PARTS)
         with np.errstate(invalid="ignore"):  # What these frames do not show is NaN, and stays
             hidden &= ~((_against_usual(own) > HIDDEN) | (_against_usual(spread) > HIDDEN))
     parts, _ = label(hidden, structure=np.ones((3, 3)))

@@ -36,19 +36,12 @@ class State:
 
 
 class Projection(NamedTuple):
-    """Edge points on the floor (n).
+    """Edge points on the floor (n), and the nearest markings of the map, of which `residual` is the distance [pixel].
 
-    Attributes:
-        residual: Signed distance from the map's marking [pixel].
-        near: Whether the point lies on the floor, near enough, by a marking wide enough.
-        valid: Whether besides the map's edge runs as the picture's does.
-        slope: How the distance changes with the place on the floor (n, 2) [pixel/m].
-        lever: From the robot to the place, in the world (n, 2) [m].
-        place: In the world (n, 2) [m].
-        heading: Of the robot (n,) [rad].
-        metres: Size of a pixel on the floor along the edge's normal (n,) [m].
-        marks: The nearest markings.
-        rates: Of the robot's pose (n, 3).
+    It changes by `slope` with the place on the floor (n, 2) [pixel/m]. `near` are points on the floor, near enough, by
+    a marking wide enough; `valid` those where besides the map's edge runs as the picture's does. Place, and lever from
+    the robot to it (n, 2) [m], are in the world; heading and rates are of the robot's pose (n,) [rad], (n, 3), and a
+    pixel on the floor along the edge's normal is so many metres (n,).
     """
 
     residual: Floats
@@ -192,7 +185,7 @@ def draw_pictures(views: Views, state: State, theta: Mapping[str, float], frames
     camera = GroundPlaneCamera(views.optics.figures(state.theta), draw_floor(views.markings.road))
     poses, rates = (each[frames] for each in views.tracks.at(state.theta.get(LATENCY, 0.0)))
     poses = poses + state.poses[frames]
-    readout, blur = (theta.get(READOUT, state.theta.get(READOUT, 0.0)), theta.get(BLUR, 0.0))
+    readout, blur = theta.get(READOUT, state.theta.get(READOUT, 0.0)), theta.get(BLUR, 0.0)
     if np.any(rates) and readout != 0.0:
         instants = (np.arange(SHOTS) / (SHOTS - 1) - 0.5) * readout
         shots = np.stack([_exposed(camera, poses + late * rates, rates, blur) for late in instants])

@@ -86,16 +86,10 @@ RIVAL_NATS = 3.0
 
 @dataclass(frozen=True)
 class CameraSelection:
-    """The effects that a camera was found to need, with all fits.
+    """The effects that a camera was found to need besides those declared, and what each explains by itself [nats].
 
-    Attributes:
-        declared: With the declared effects alone.
-        model: With those that are needed besides.
-        full: With every effect of the catalogue.
-        effects: Needed besides those declared.
-        losses: Of the best set of each size that was tried, all effects together being 0 [nats].
-        alone: What each effect explains by itself beyond what is declared [nats].
-        rivals: Other sets of as many effects that do as well.
+    Fits are with the declared effects alone, with those that are needed besides, and with every effect of the
+    catalogue; `losses` of the best set of each size, that of all effects being 0 [nats]. Rivals do as well.
     """
 
     declared: CameraFit
@@ -115,7 +109,8 @@ def fit_everything(views: Views, names: Sequence[str], fixed: Mapping[str, float
     fit = fit_camera(replace(views, tape_m=0.0), start, [name for name in names if name in FIRST], FAR)
     fit = fit_camera(views, fit.state, names, NEAR)
     for _ in range(PASSES if learn_scatter else 0):
-        fit = fit_camera(views.with_scatter(*pose_scatter(fit)), fit.state, names, AGAIN)
+        place, turn = pose_scatter(fit)
+        fit = fit_camera(replace(views, position_m=place, heading_rad=turn), fit.state, names, AGAIN)
     return fit
 
 

@@ -19,28 +19,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from proxytune.diagnosis.motion import latency
 from proxytune.diagnosis.motion.drives import Drives, Floats, gather, number_of
-from proxytune.diagnosis.motion.latency import (
-    LATENCY_BLOCK_S,
-    LEAST_APART_S,
-    STEP_S,
-    SURE,
-    Blocks,
-    Jump,
-    Latency,
-    Reaction,
-    Speeds,
-    blocks_within,
-    clock_drift,
-    deviants,
-    likeliest_latency,
-    measured_speeds,
-    reaction,
-    reaction_at,
-    squares_by_latency,
-    stretches,
-    sum_in_blocks,
-)
+from proxytune.diagnosis.motion.latency import Jump
 from proxytune.driving import Robot
 from proxytune.effects import PARAMETERS
 from proxytune.errors import LogError
@@ -118,7 +99,7 @@ def on_one_clock(log: Log, robot: Robot, like: Clocks | None = None) -> tuple[Lo
 def read_clocks(log: Log, robot: Robot, like: Clocks | None = None) -> Clocks:
     """Measure the latency of every drive of a log; where it is not what is left of a log it is like, clocks differ."""
     drives = gather(log, robot, log.episodes, compared=False)
-    speeds = measured_speeds(drives) if len(drives.first) else None
+    speeds = latency.measured_speeds(drives) if len(drives.first) else None
     if speeds is None or not len(speeds.first):
         # Drives too short to tell are taken to have one clock.
         kept_s, later_s = np.tile((0.0, np.inf), (len(log.episodes), 1)), np.zeros(len(log.episodes))
@@ -127,40 +108,44 @@ def read_clocks(log: Log, robot: Robot, like: Clocks | None = None) -> Clocks:
     begin = np.array([episode.times[0] for episode in log.episodes])
     drift = NONE
     for _ in range(DRIFT_PASSES):
-        more = clock_drift(squares, begin[squares.episode] + (squares.number + 0.5) * LATENCY_BLOCK_S, latencies)
+        times = begin[squares.episode] + (squares.number + 0.5) * latency.LATENCY_BLOCK_S
+        more = latency.clock_drift(squares, times, latencies)
         if more is None or not (drift.value or more.is_sure):
             break
-        drift = _offset(Latency(drift.value + more.rate, more.deviation), 0.0)
+        drift = _offset(latency.Latency(drift.value + more.rate, more.deviation), 0.0)
         log = without_drift(log, more.rate)
         squares, latencies, apart = _squares(log, gather(log, robot, log.episodes), speeds)
-    kept, jumps = stretches(log, squares, latencies)
-    varied = not _is_rare(len({jump.drive for jump in jumps}), len(log.episodes))
+    kept, jumps = latency.stretches(log, squares, latencies)
+    # Few odd drives may be their clocks; a robot whose lag is another in every manoeuvre, as with ramps, has many.
+    most = max(1.0, RARE * len(log.episodes))
+    varied = len({jump.drive for jump in jumps}) > most
     if varied:
         # Where poses step, it is the clock, however many drives have it.
-        proven, at_steps = stretches(log, squares, latencies, at_steps=True)
-        unproven = {jump.drive for jump in jumps} - {jump.drive for jump in at_steps}
-        varied = not _is_rare(len(unproven), len(log.episodes))
+        proven, at_steps = latency.stretches(log, squares, latencies, at_steps=True)
+        varied = len({jump.drive for jump in jumps} - {jump.drive for jump in at_steps}) > most
         kept, jumps = (proven, at_steps) if varied else (kept, jumps)
     jumped = {jump.drive for jump in jumps}
-    own = [squares.squares[blocks_within(squares, e, kept[e])] for e in range(len(log.episodes))]
-    common, others = deviants(own, latencies)
+    own = [squares.squares[latency.blocks_within(squares, e, kept[e])] for e in range(len(log.episodes))]
+    common, others = latency.deviants(own, latencies)
     whole = [e for e in others if log.episodes[e].name not in jumped]
-    if varied or not _is_rare(len(whole), len(log.episodes)):
+    if varied or len(whole) > most:
         others = {e: one for e, one in others.items() if e not in whole}
-    latency = likeliest_latency(np.concatenate([part for e, part in enumerate(own) if e not in others]), latencies)
+    alike = np.concatenate([part for e, part in enumerate(own) if e not in others])
+    usual = latency.likeliest_latency(alike, latencies)
     assumed = like.left_s if like else max(robot.theta.get("delay", 0.0), ASSUMED_DELAY_S)
-    unlike = like is not None and abs(latency.value - assumed) > max(LEAST_APART_S, SURE * latency.deviation)
-    half = 1.96 * latency.deviation
-    early = latency.value + half < 0.0 and latency.value < -EARLIEST_S
+    least_apart = max(latency.LEAST_APART_S, latency.SURE * usual.deviation)
+    unlike = like is not None and abs(usual.value - assumed) > least_apart
+    half = 1.96 * usual.deviation
+    early = usual.value + half < 0.0 and usual.value < -EARLIEST_S
     # No delay accounts for such a latency.
-    impossible = early or latency.value - half > PARAMETERS["delay"].high
+    impossible = early or usual.value - half > PARAMETERS["delay"].high
     taken = log.fit_clock_offset or unlike or (apart and impossible)
-    later = np.full(len(own), assumed - latency.value if taken else 0.0)
+    later = np.full(len(own), assumed - usual.value if taken else 0.0)
     for e, one in others.items():
         later[e] -= one.value - common
     return Clocks(
-        latency=_offset(latency, 0.0),
-        offset=_offset(latency, assumed) if taken else NONE,
+        latency=_offset(usual, 0.0),
+        offset=_offset(usual, assumed) if taken else NONE,
         assumed_delay_s=assumed,
         drives={log.episodes[e].name: _offset(one, common) for e, one in others.items()},
         jumps=jumps,
@@ -183,7 +168,11 @@ def put_on_one_clock(log: Log, clocks: Clocks) -> Log:
         if later_s:
             episode = replace(episode, issued=_issued(episode) - later_s)
         begin, end = episode.times[0] + np.maximum(kept_s, (-later_s, 0.0)) + (-1e-9, 1e-9)
-        return _measured_within(episode, begin, end)
+        known, measured = (begin <= episode.times) & (episode.times <= end), episode.measured
+        if measured is not None:
+            own = known[measured.rows]
+            measured = Measured(measured.times[own], measured.poses[own], measured.rows[own])
+        return replace(episode, poses=np.where(known[:, None], episode.poses, np.nan), measured=measured)
 
     episodes = without_drift(log, clocks.drift.value).episodes
     return replace(log, episodes=tuple(map(retime, episodes, clocks.later_s, clocks.kept_s)))
@@ -191,16 +180,6 @@ def put_on_one_clock(log: Log, clocks: Clocks) -> Log:
 
 def _issued(episode: LogEpisode) -> Floats:
     return episode.times if episode.issued is None else episode.issued
-
-
-def _measured_within(episode: LogEpisode, begin: float, end: float) -> LogEpisode:
-    """An episode of which no pose is known but those of these times [s]."""
-    known = (begin <= episode.times) & (episode.times <= end)
-    measured = episode.measured
-    if measured is not None:
-        own = known[measured.rows]
-        measured = Measured(measured.times[own], measured.poses[own], measured.rows[own])
-    return replace(episode, poses=np.where(known[:, None], episode.poses, np.nan), measured=measured)
 
 
 def without_drift(log: Log, rate: float) -> Log:
@@ -212,22 +191,14 @@ def without_drift(log: Log, rate: float) -> Log:
     return replace(log, episodes=tuple(replace(one, issued=own + rate * (own - first)) for own, one in issued))
 
 
-def _is_rare(count: int, drives: int) -> bool:
-    """Tell whether so few drives are odd that it may be their clocks.
-
-    A robot whose lag is another in every manoeuvre, as one that ramps its duties, has many.
-    """
-    return count <= max(1.0, RARE * drives)
-
-
-def _squares(log: Log, drives: Drives, speeds: Speeds) -> tuple[Blocks, Floats, bool]:
+def _squares(log: Log, drives: Drives, speeds: latency.Speeds) -> tuple[latency.Blocks, Floats, bool]:
     """Squares of blocks that the best reaction leaves, their latencies, and whether its own is impossible."""
     best, apart = _reaction(drives, speeds)
-    count = int(_reach(drives) / STEP_S)
-    latencies = best.latency_s + np.arange(-count, count + 1) * STEP_S
+    count = int(_reach(drives) / latency.STEP_S)
+    latencies = best.latency_s + np.arange(-count, count + 1) * latency.STEP_S
     ends = np.array([len(e.times) for e in log.episodes]) * round(drives.tick_hz / log.rate_hz)
-    squares = squares_by_latency(drives, speeds, best, latencies, ends)
-    return Blocks(*sum_in_blocks(LATENCY_BLOCK_S, drives, speeds, squares)), latencies, apart
+    squares = latency.squares_by_latency(drives, speeds, best, latencies, ends)
+    return latency.Blocks(*latency.sum_in_blocks(latency.LATENCY_BLOCK_S, drives, speeds, squares)), latencies, apart
 
 
 def _reach(drives: Drives) -> float:
@@ -235,20 +206,20 @@ def _reach(drives: Drives) -> float:
     return float(np.clip(drives.last.max() / drives.tick_hz / 3.0, 0.5, FURTHEST_S))
 
 
-def _offset(latency: Latency, besides: float) -> Offset:
-    middle, half = latency.value - besides, min(1.96 * latency.deviation, FURTHEST_S)
+def _offset(known: latency.Latency, besides: float) -> Offset:
+    middle, half = known.value - besides, min(1.96 * known.deviation, FURTHEST_S)
     return Offset(middle, (middle - half, middle + half))
 
 
-def _reaction(drives: Drives, speeds: Speeds) -> tuple[Reaction, bool]:
+def _reaction(drives: Drives, speeds: latency.Speeds) -> tuple[latency.Reaction, bool]:
     """The best reaction; with a latency that no delay has only if that is clearly better, and whether it is."""
     most = PARAMETERS["delay"].high
-    free = reaction(drives, speeds, _reach(drives))
+    free = latency.reaction(drives, speeds, _reach(drives))
     if 0.0 <= free.latency_s <= most:
         return free, False
-    usual = min((reaction_at(drives, speeds, end) for end in (0.0, most)), key=lambda one: one.squares.sum())
-    _, _, better = sum_in_blocks(PROOF_BLOCK_S, drives, speeds, usual.squares - free.squares)
-    sure = better.sum() > SURE * np.sqrt(len(better)) * better.std()
+    usual = min((latency.reaction_at(drives, speeds, end) for end in (0.0, most)), key=lambda one: one.squares.sum())
+    _, _, better = latency.sum_in_blocks(PROOF_BLOCK_S, drives, speeds, usual.squares - free.squares)
+    sure = better.sum() > latency.SURE * np.sqrt(len(better)) * better.std()
     return (free, True) if sure else (usual, False)
 
 
@@ -371,8 +342,7 @@ class Parts(NamedTuple):
 def split(log: Log, robot: Robot, test: Log | None) -> Parts:
     """Keep every third episode to test on, or the second half of each where there are few, or another log.
 
-    Raises:
-        LogError: If there is too little to fit or to test on.
+    Refused if there is too little to fit or to test on.
     """
     if test is not None:
         parts = Parts(*(gather(one, robot, one.episodes) for one in (log, test)))
@@ -383,10 +353,8 @@ def split(log: Log, robot: Robot, test: Log | None) -> Parts:
         parts = _halve(gather(log, robot, log.episodes))
     for name, drives in zip(("fit", "test on"), parts, strict=True):
         if drives.seconds < LEAST_MOTION_S:
-            raise LogError(
-                f"{log.name}: only {drives.seconds:.1f} s of measured motion to {name}, at least {LEAST_MOTION_S:.0f} "
-                "s are needed for each; record more episodes"
-            )
+            problem = f"{log.name}: only {drives.seconds:.1f} s of measured motion to {name}"
+            raise LogError(f"{problem}, at least {LEAST_MOTION_S:.0f} s are needed for each; record more episodes")
     return Parts(thin(cut_into_blocks(parts.fitted)), cut_into_blocks(parts.tested))
 
 

@@ -13,50 +13,16 @@ from typing import NamedTuple
 import numpy as np
 
 from proxytune.diagnosis.answer import RULES, Estimate, Progress, Rules, verdict
-from proxytune.diagnosis.motion.clocks import (
-    Clocks,
-    Parts,
-    cut_into_blocks,
-    on_one_clock,
-    split,
-)
+from proxytune.diagnosis.motion import effect_size, multistep_fit, prediction
+from proxytune.diagnosis.motion.clocks import Clocks, Parts, cut_into_blocks, on_one_clock, split
 from proxytune.diagnosis.motion.discrepancy import Learning, learn
 from proxytune.diagnosis.motion.drives import Drives, Floats, gather
-from proxytune.diagnosis.motion.effect_size import (
-    EffectSize,
-    RobotClusters,
-    drop_negligible,
-    find_robot_clusters,
-    invisible_effects,
-    measure_effect_sizes,
-)
 from proxytune.diagnosis.motion.evidence import AdoptedEffect, Findings, Variant
 from proxytune.diagnosis.motion.excitation import LIMITS, Limits, NextDrive, design_drive
 from proxytune.diagnosis.motion.fitting import Fit, check_motion, check_units, intervals
 from proxytune.diagnosis.motion.innovations import Noise, at_edge
 from proxytune.diagnosis.motion.moments import Period, find_period
-from proxytune.diagnosis.motion.multistep_fit import (
-    HORIZONS_S,
-    MultistepFit,
-    PoseNoise,
-    bullet_pose_errors,
-    fit_multistep,
-    has_body,
-    noise_floor,
-    pose_noise,
-)
-from proxytune.diagnosis.motion.prediction import (
-    Ratio,
-    Repeated,
-    Rmse,
-    Windows,
-    blocks_of,
-    compare_repeats,
-    cut,
-    pose_errors,
-    ratio,
-    rmse,
-)
+from proxytune.diagnosis.motion.multistep_fit import has_body
 from proxytune.diagnosis.motion.screening import MOTION_EFFECTS, motion_effects
 from proxytune.diagnosis.motion.selection import fit_declared, select_effects
 from proxytune.diagnosis.stages import Stages, facts_of
@@ -76,20 +42,16 @@ MAIN_S = 2.0
 
 
 class Bracket(NamedTuple):
-    """The two errors between which that of a right model lies.
+    """The two errors between which that of a right model lies [m], the lower one of the noise of measured poses alone.
 
-    Attributes:
-        lower: What the noise of measured poses alone makes [m].
-        upper: What a right model might have by chance where this was the lowest error that any model reached, less what
-            drives repeat of it [m].
-        reached: The lowest error that any model reached [m].
-        again: What drives from the same commands say; None where too few were driven.
+    The upper one is what a right model might have by chance where this was the lowest error that any model reached,
+    less what drives from the same commands repeat of it, if there are any.
     """
 
     lower: float
     upper: float
     reached: float
-    again: Repeated | None
+    again: prediction.Repeated | None
 
     @property
     def least(self) -> float:
@@ -101,10 +63,9 @@ class Bracket(NamedTuple):
         return max(self.lower, float(np.sqrt((1.0 - self.again.part) * self.lower**2 + self.again.part * apart**2)))
 
 
-def bracket(lower: float, reached: float, again: Repeated | None, rules: Rules = RULES) -> Bracket:
+def bracket(lower: float, reached: float, again: prediction.Repeated | None, rules: Rules = RULES) -> Bracket:
     """Bracket the error of a right model [m]; the lower end, an estimate too, is never above what a model reached."""
-    lower = min(lower, reached)
-    upper = reached
+    lower, upper = min(lower, reached), reached
     if again is not None:
         # All of the error is noise in windows that were driven once.
         most = min(reached, again.apart * again.share.interval[1] / again.share.value)
@@ -150,12 +111,12 @@ class HorizonError:
 
     horizon_s: float
     windows: int
-    before: Rmse
-    after: Rmse
-    ratio: Ratio
+    before: prediction.Rmse
+    after: prediction.Rmse
+    ratio: prediction.Ratio
     floor: Bracket
-    heading_before: Rmse
-    heading_after: Rmse
+    heading_before: prediction.Rmse
+    heading_after: prediction.Rmse
     heading_floor: float
 
     @property
@@ -171,43 +132,43 @@ class KeptAside(NamedTuple):
 
     drives: Drives
     whole: Drives
-    noise: PoseNoise
+    noise: multistep_fit.PoseNoise
 
 
-PoseErrors = Callable[[Drives, Theta, Windows], Floats]
+PoseErrors = Callable[[Drives, Theta, prediction.Windows], Floats]
 """Gives the distance of a model's poses from measured ones (M, 2): [m], [rad]."""
 
 
 def horizon_error(
-    found: Findings, tested: KeptAside, horizon_s: float, learnt: Theta, how: PoseErrors = pose_errors
+    found: Findings, tested: KeptAside, horizon_s: float, learnt: Theta, how: PoseErrors = prediction.pose_errors
 ) -> HorizonError | None:
     """Measure the error at a horizon, None where too few blocks have a window of it.
 
     The model that was `learnt`, where there is one, may lower what was reached; `how` is a plant's poses.
     """
     drives, rules = tested.drives, tested.drives.rules
-    windows = cut(drives, horizon_s)
+    windows = prediction.cut(drives, horizon_s)
     if len(np.unique(drives.block[windows.begin])) < rules.fewest_blocks:
         return None
-    blocks = blocks_of(drives, windows)
+    blocks = prediction.blocks_of(drives, windows)
     before = how(drives, found.declared.theta, windows) ** 2
     same = found.model.theta == found.declared.theta
     after = before if same else how(drives, found.model.theta, windows) ** 2
-    lower, turn = noise_floor(drives, windows, tested.noise)
+    lower, turn = multistep_fit.noise_floor(drives, windows, tested.noise)
     besides = [one.beside.theta for one in found.negligible]
     if learnt:
         besides.append(learnt)
-    others = [pose_errors(drives, theta, windows) ** 2 for theta in besides]
+    others = [prediction.pose_errors(drives, theta, windows) ** 2 for theta in besides]
     reached = min(float(np.sqrt(squares[:, 0].mean())) for squares in (before, after, *others))
     return HorizonError(
         horizon_s=horizon_s,
         windows=len(windows.begin),
-        before=rmse(before[:, 0], blocks),
-        after=rmse(after[:, 0], blocks),
-        ratio=ratio(after[:, 0], before[:, 0], blocks, rules.ratio_p_value),
-        floor=bracket(lower, reached, compare_repeats(tested.whole, found.model.theta, horizon_s), rules),
-        heading_before=rmse(before[:, 1], blocks),
-        heading_after=rmse(after[:, 1], blocks),
+        before=prediction.rmse(before[:, 0], blocks),
+        after=prediction.rmse(after[:, 0], blocks),
+        ratio=prediction.ratio(after[:, 0], before[:, 0], blocks, rules.ratio_p_value),
+        floor=bracket(lower, reached, prediction.compare_repeats(tested.whole, found.model.theta, horizon_s), rules),
+        heading_before=prediction.rmse(before[:, 1], blocks),
+        heading_after=prediction.rmse(after[:, 1], blocks),
         heading_floor=turn,
     )
 
@@ -254,8 +215,8 @@ class Diagnosis:
     theta: Mapping[str, Estimate]
     effects: tuple[AdoptedEffect, ...]
     negligible: tuple[AdoptedEffect, ...]
-    effect_sizes: Mapping[str, EffectSize]
-    multistep: MultistepFit | None
+    effect_sizes: Mapping[str, effect_size.EffectSize]
+    multistep: multistep_fit.MultistepFit | None
     residual_depends_on: tuple[str, ...]
     errors: tuple[HorizonError, ...]
     confirmed: HorizonError | None
@@ -265,7 +226,7 @@ class Diagnosis:
     parts: Parts
     found: Findings
     clocks: tuple[Clocks, ...]
-    robot_clusters: RobotClusters | None
+    robot_clusters: effect_size.RobotClusters | None
     drive_names: tuple[str, ...]
     learning: Learning
     period: Period | None = None
@@ -319,18 +280,7 @@ def diagnose(
     limits: Limits = LIMITS,
     folder: Path | None = None,
 ) -> Diagnosis:
-    """Tune what is declared, find what is missing, and test both on drives kept aside.
-
-    Args:
-        log: Measured drives.
-        robot: The robot that drove.
-        declared: Effects whose parameters are tuned in any case.
-        test: Another log to test on; without it a part of the drives is kept.
-        seed: Of the null distributions.
-        report: Takes a line about each step, as it begins.
-        rules: Thresholds of what is named, believed and told.
-        limits: Of the next drive.
-        folder: Where results are kept on the way, so that a diagnosis that was killed goes on; None: nowhere.
+    """Tune what is declared, find what is missing, and test both on drives kept aside, as `diagnose_log` says it.
 
     Raises:
         LogError: If the log cannot bear the question (too short, no motion, other units), or a declared effect is
@@ -357,18 +307,20 @@ def diagnose(
     report("fitting what is declared")
     declared_alone = keep("declared", lambda: fit_declared(parts.fitted, start, names))
     selected = keep("selected", lambda: select_effects(declared_alone, seed, report))
-    named = keep("worth", lambda: drop_negligible(selected, seed, parts.tested))
+    named = keep("worth", lambda: effect_size.drop_negligible(selected, seed, parts.tested))
     report("fitting to windows of prediction")
-    declared_fit, before = keep("declared_windows", lambda: fit_multistep(named.declared))
+    declared_fit, before = keep("declared_windows", lambda: multistep_fit.fit_multistep(named.declared))
     # Before and after are compared on equal terms.
-    added = named.adopted or named.negligible
-    model, after = keep("windows", lambda: fit_multistep(named.model)) if added else (declared_fit, before)
+    model, after = declared_fit, before
+    if named.adopted or named.negligible:
+        model, after = keep("windows", lambda: multistep_fit.fit_multistep(named.model))
     found = replace(named, declared=declared_fit, model=model)
     report("learning what no named effect explains")
-    learning = keep("learnt", lambda: learn(found, parts.tested, HORIZONS_S))
+    learning = keep("learnt", lambda: learn(found, parts.tested, multistep_fit.HORIZONS_S))
     report("testing on drives kept aside")
-    tested = KeptAside(parts.tested, whole, pose_noise(parts.tested, found.model.theta))
-    told = [keep(f"error_{h:g}", lambda h=h: horizon_error(found, tested, h, learning.model)) for h in HORIZONS_S]  # type: ignore[misc]
+    tested = KeptAside(parts.tested, whole, multistep_fit.pose_noise(parts.tested, found.model.theta))
+    asked = multistep_fit.HORIZONS_S
+    told = [keep(f"error_{h:g}", lambda h=h: horizon_error(found, tested, h, learning.model)) for h in asked]  # type: ignore[misc]
     errors = tuple(error for error in told if error is not None)
     if not errors:
         raise LogError(f"{log.name}: no second of unbroken poses to test on; record longer drives")
@@ -382,16 +334,17 @@ def diagnose(
     confirmed = None
     if has_body(parts.tested):
         report("confirming on the bullet plant")
-        confirmed = keep("bullet", lambda: horizon_error(found, tested, CONFIRMED_S, {}, bullet_pose_errors))
+        on_bullet = multistep_fit.bullet_pose_errors
+        confirmed = keep("bullet", lambda: horizon_error(found, tested, CONFIRMED_S, {}, on_bullet))
     every = whole if test is None else replace(gather(log, robot, log.episodes), rules=rules)
     dropped = tuple(one.effect for one in found.negligible)
     beside = Variant(found.model.theta, found.model.free)
-    sizes = measure_effect_sizes(found.model, parts.tested, beside, found.adopted, seed)
+    sizes = effect_size.measure_effect_sizes(found.model, parts.tested, beside, found.adopted, seed)
     for effect, model_with, _ in found.negligible:
-        sizes += measure_effect_sizes(found.model, parts.tested, model_with, [effect], seed)
+        sizes += effect_size.measure_effect_sizes(found.model, parts.tested, model_with, [effect], seed)
     report("designing the next drive")
     seen = {effect_of(name) for name in names} | {effect.effect for effect in (*found.adopted, *dropped)}
-    unseen = invisible_effects(found.model, seen)
+    unseen = effect_size.invisible_effects(found.model, seen)
     return Diagnosis(
         log=log.name,
         robot=robot,
@@ -415,7 +368,7 @@ def diagnose(
         parts=parts,
         found=found,
         clocks=clocks,
-        robot_clusters=find_robot_clusters(cut_into_blocks(every), found.model),
+        robot_clusters=effect_size.find_robot_clusters(cut_into_blocks(every), found.model),
         drive_names=tuple(episode.name for episode in log.episodes),
         learning=learning,
         period=period,
@@ -444,7 +397,9 @@ def declared_parameters(effects: Iterable[str], catalogue: Catalogue = SHIPPED) 
     return tuple(dict.fromkeys(names))
 
 
-def estimates(fitted: Fit, adopted: Iterable[AdoptedEffect], multistep: MultistepFit | None) -> dict[str, Estimate]:
+def estimates(
+    fitted: Fit, adopted: Iterable[AdoptedEffect], multistep: multistep_fit.MultistepFit | None
+) -> dict[str, Estimate]:
     """Give the values of a fitted model with their intervals; the interval of a fixed value has no width."""
     parameters = fitted.drives.robot.catalogue.parameters
     known = intervals(fitted) | (dict(multistep.intervals) if multistep else {})

@@ -22,7 +22,6 @@ from proxytune.effects import SHIPPED, Catalogue, track_of
 from proxytune.errors import LogError
 from proxytune.logs import Log, LogEpisode, check_kind, rows_of_poses, without_outliers
 from proxytune.settings import GEOMETRY, nearest
-from proxytune.space import Theta
 
 
 def cosine_and_sine(angle: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
@@ -67,8 +66,7 @@ Floats = NDArray[Any]
 def duties_of(log: Log, robot: Robot, commands: Floats) -> Floats:
     """A log's commands (…, 2) as fractions of full wheel speed, left and right; of a car as throttle and steering.
 
-    Raises:
-        LogError: If the log has no commands, they are not of such a robot, or they ask for more than it can.
+    Refused if it has none, they are not of such a robot, or they ask for more than it can.
     """
     figures = robot.figures
     if log.command == "none":
@@ -84,12 +82,10 @@ def duties_of(log: Log, robot: Robot, commands: Floats) -> Floats:
     else:
         speeds = commands * figures["wheel_radius"]
     duties = speeds / figures["full_speed"]
-    fastest = float(np.abs(duties).max())
+    fastest, full = float(np.abs(duties).max()), figures["full_speed"]
     if fastest > 1.0 + 1e-9:
-        raise LogError(
-            f"{log.name}: asks a wheel for {fastest * figures['full_speed']:.2f} m/s, more than the robot's full speed "
-            f"{figures['full_speed']:g} m/s; state a higher full_speed_m_s in log.toml"
-        )
+        problem = f"asks a wheel for {fastest * full:.2f} m/s, more than the robot's full speed {full:g} m/s"
+        raise LogError(f"{log.name}: {problem}; state a higher full_speed_m_s in log.toml")
     return np.asarray(duties)
 
 
@@ -99,13 +95,11 @@ def _steered(log: Log, robot: Robot, commands: Floats) -> Floats:
     if log.command == "twist":
         with np.errstate(divide="ignore", invalid="ignore"):
             angles = np.arctan(np.where(commands[..., 1] == 0.0, 0.0, figures["wheelbase"] * commands[..., 1] / speeds))
-    fastest, widest = float(np.abs(speeds).max()), math.radians(figures["wheel_angle"])
-    if fastest > figures["full_speed"] * (1.0 + 1e-9):
-        raise LogError(
-            f"{log.name}: asks for {fastest:.2f} m/s, more than the full speed {figures['full_speed']:g} m/s of robot "
-            f"'{robot.name}'; state a higher full_speed in its robot.toml"
-        )
-    return np.stack((speeds / figures["full_speed"], np.clip(angles / widest, -1.0, 1.0)), axis=-1)
+    fastest, full, widest = float(np.abs(speeds).max()), figures["full_speed"], math.radians(figures["wheel_angle"])
+    if fastest > full * (1.0 + 1e-9):
+        problem = f"asks for {fastest:.2f} m/s, more than the full speed {full:g} m/s of robot '{robot.name}'"
+        raise LogError(f"{log.name}: {problem}; state a higher full_speed in its robot.toml")
+    return np.stack((speeds / full, np.clip(angles / widest, -1.0, 1.0)), axis=-1)
 
 
 def commands_as(kind: str, robot: Robot, duties: Floats) -> Floats:
@@ -270,24 +264,13 @@ class Drives:
         return relative(self.poses[:, 0], self.poses[:, 1])
 
     @cached_property
-    def replays(self) -> Recent[Floats]:
-        """The increments (N, 3) that models made of these drives lately."""
-        return Recent()
+    def _recent(self) -> dict[str, Recent[Any]]:
+        return {}
 
-    @cached_property
-    def arrivals(self) -> Recent[Floats]:
-        """The commands (E, T, 2) that reached the motors in models lately."""
-        return Recent()
-
-    @cached_property
-    def turns(self) -> Recent[Floats]:
-        """The wheel speeds (E, T, 2) that models made of these drives lately."""
-        return Recent()
-
-    @cached_property
-    def fits(self) -> Recent[Theta]:
-        """The values in θ that were fitted to windows of these drives lately."""
-        return Recent(SEVERAL)
+    def remember(self, kind: str, key: Hashable, make: Callable[[], Result], most: int = MOST) -> Result:
+        """What models made of these drives lately: the one of this kind and key, made if it is not kept."""
+        found: Result = self._recent.setdefault(kind, Recent(most)).get(key, make)
+        return found
 
     @cached_property
     def places(self) -> Floats:
@@ -491,10 +474,9 @@ def robot_of(log: Log, name: str | None = None, catalogue: Catalogue = SHIPPED) 
         return replace(robot, catalogue=replace(catalogue, drive=robot.drive))
     missing = [key for figure, key in NEEDED.items() if figure not in log.geometry]
     if missing:
-        raise LogError(
-            f"{log.name}: robot '{log.robot}' is unknown ({nearest(log.robot, names)}) and log.toml does not "
-            f"state {' and '.join(missing)}; state them, or name a robot with --robot"
-        )
+        unknown = f"{log.name}: robot '{log.robot}' is unknown ({nearest(log.robot, names)})"
+        lacks = f"log.toml does not state {' and '.join(missing)}"
+        raise LogError(f"{unknown} and {lacks}; state them, or name a robot with --robot")
     geometry = {**log.geometry}
     geometry.setdefault("full_speed", _full_speed(log))
     return replace(robot_from_geometry(log.robot, geometry, log.rate_hz), catalogue=catalogue)

@@ -12,36 +12,18 @@ gains of single drives whether all are of one robot (`find_robot_clusters`).
 """
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
 from proxytune.diagnosis.answer import RULES, Rules
+from proxytune.diagnosis.motion import innovations, multistep_fit
 from proxytune.diagnosis.motion.drives import Drives, Floats, sum_by
 from proxytune.diagnosis.motion.evidence import AdoptedEffect, DroppedEffect, Findings, Variant, without_effect
 from proxytune.diagnosis.motion.fitting import KEPT_SOLVABLE, Fit, evaluate, fit, slopes
-from proxytune.diagnosis.motion.innovations import (
-    HUBER,
-    RANDOM_EFFECTS,
-    Coordinate,
-    clip_outliers,
-    drawn_paths,
-    increments,
-    paths,
-    spans,
-    theta_at,
-)
-from proxytune.diagnosis.motion.multistep_fit import (
-    compare_errors,
-    fit_windows,
-    held_out_squares,
-    horizons,
-    noise_floor,
-    pose_noise,
-)
-from proxytune.diagnosis.motion.prediction import Ratio, Windows, blocks_of, cut, motion_in, pose_errors, ratio, rmse
+from proxytune.diagnosis.motion.prediction import Ratio, Windows, blocks_of, cut, motion_in, ratio, rmse
 from proxytune.diagnosis.motion.random_effects import responses
 from proxytune.diagnosis.motion.screening import candidates, motion_effects, project_out
 from proxytune.space import Theta
@@ -84,14 +66,11 @@ def drop_negligible(found: Findings, seed: int, aside: Drives | None = None) -> 
     drives = found.model.drives
     variant, kept = Variant(found.model.theta, found.model.free), list(found.adopted)
     dropped: list[DroppedEffect] = []
-    while kept and horizons(drives) and (aside is None or horizons(aside)):
-        if aside is None:
-            weighed = _weigh_effects(found.model, variant, kept, seed)
-            negligible = [one for one in weighed if not one.material]
-        else:
-            sizes = measure_effect_sizes(found.model, aside, variant, kept, seed)
-            weighed = [WeighedEffect(effect, size, drives.rules) for effect, size in zip(kept, sizes, strict=True)]
-            negligible = [one for one in weighed if not any(size.above for size in one.size.values())]
+    while kept and multistep_fit.horizons(drives) and (aside is None or multistep_fit.horizons(aside)):
+        sizes = measure_effect_sizes(found.model, aside, variant, kept, seed)
+        weighed = [WeighedEffect(effect, size, drives.rules) for effect, size in zip(kept, sizes, strict=True)]
+        worth = [one.material if aside is None else any(size.above for size in one.size.values()) for one in weighed]
+        negligible = [one for one, needed in zip(weighed, worth, strict=True) if not needed]
         weakest = min(negligible, key=lambda one: max(size.value for size in one.size.values()), default=None)
         if weakest is None:
             break
@@ -104,31 +83,27 @@ def drop_negligible(found: Findings, seed: int, aside: Drives | None = None) -> 
     return replace(found, model=model, adopted=tuple(kept), negligible=found.negligible + tuple(dropped))
 
 
-def _weigh_effects(model: Fit, variant: Variant, effects: Sequence[AdoptedEffect], seed: int) -> list[WeighedEffect]:
-    """Weigh each effect of a model on the drives it was fitted to, with blocks left out in turn."""
-    drives, whole = model.drives, _held_out(model, variant)[1]
-    found = []
+def measure_effect_sizes(
+    model: Fit, tested: Drives | None, variant: Variant, effects: Iterable[AdoptedEffect], seed: int
+) -> list[EffectSize]:
+    """Measure the error without each effect by the error with all, on drives that nothing was fitted to.
+
+    Without such drives it is measured on those that were fitted, with blocks left out in turn.
+    """
+    drives, rate_hz = model.drives if tested is None else tested, model.drives.rate_hz
+
+    def squares(one: Variant) -> dict[float, Floats]:
+        return _held_out(model, one)[1] if tested is None else _squares(model, tested, one)
+
+    whole, sizes = squares(variant), list[EffectSize]()
     for effect in effects:
         if effect.free:
-            size = compare_errors(drives, _held_out(model, without_effect(variant, effect, drives.rate_hz))[1], whole)
+            sizes.append(multistep_fit.compare_errors(drives, squares(without_effect(variant, effect, rate_hz)), whole))
         else:
             # Blocks left out add errors of the fit, which are no draws.
-            size = _size_of_draws(drives, variant, _plain_squares(drives, variant.theta), seed)
-        found.append(WeighedEffect(effect, size, drives.rules))
-    return found
-
-
-def measure_effect_sizes(
-    model: Fit, tested: Drives, variant: Variant, effects: Iterable[AdoptedEffect], seed: int
-) -> list[EffectSize]:
-    """Measure the error without each effect by the error with all, on drives that nothing was fitted to."""
-    whole, rate_hz = _squares(model, tested, variant), model.drives.rate_hz
-    return [
-        compare_errors(tested, _squares(model, tested, without_effect(variant, effect, rate_hz)), whole)
-        if effect.free
-        else _size_of_draws(tested, variant, whole, seed)
-        for effect in effects
-    ]
+            plain = multistep_fit.squared_errors(drives, variant.theta) if tested is None else whole
+            sizes.append(_size_of_draws(drives, variant, plain, seed))
+    return sizes
 
 
 def _squares(model: Fit, tested: Drives, variant: Variant) -> dict[float, Floats]:
@@ -136,8 +111,8 @@ def _squares(model: Fit, tested: Drives, variant: Variant) -> dict[float, Floats
     fitted = model.drives
     theta = _held_out(model, variant)[0] if fitted.robot.drive == "ackermann" else None
     if theta is None:
-        theta = fit_windows(fitted, variant.theta, variant.free, cut(fitted, _length(fitted)))
-    return _plain_squares(tested, theta)
+        theta = multistep_fit.fit_windows(fitted, variant.theta, variant.free, cut(fitted, _length(fitted)))
+    return multistep_fit.squared_errors(tested, theta)
 
 
 def _held_out(model: Fit, variant: Variant) -> tuple[Theta | None, dict[float, Floats]]:
@@ -147,20 +122,17 @@ def _held_out(model: Fit, variant: Variant) -> tuple[Theta | None, dict[float, F
     predicts better, that is given too, with its errors.
     """
     drives, length = model.drives, _length(model.drives)
-    windows = held_out_squares(drives, variant.theta, variant.free, length)
+    windows = multistep_fit.held_out_squares(drives, variant.theta, variant.free, length)
     if drives.robot.drive != "ackermann" or not windows:
         return None, windows
     theta = fit(drives, variant.theta, variant.free, model.noise).theta
-    steps = _plain_squares(drives, theta)
+    steps = multistep_fit.squared_errors(drives, theta)
     return (theta, steps) if steps[length].mean() < windows[length].mean() else (None, windows)
 
 
-def _plain_squares(drives: Drives, theta: Theta) -> dict[float, Floats]:
-    return {h: pose_errors(drives, theta, cut(drives, h))[:, 0] ** 2 for h in horizons(drives)}
-
-
 def _length(drives: Drives) -> float:
-    return max((h for h in horizons(drives) if h <= FITTED_S), default=min(horizons(drives), default=FITTED_S))
+    known = multistep_fit.horizons(drives)
+    return max((h for h in known if h <= FITTED_S), default=min(known, default=FITTED_S))
 
 
 def _size_of_draws(drives: Drives, variant: Variant, whole: Mapping[float, Floats], seed: int) -> dict[float, Ratio]:
@@ -168,10 +140,10 @@ def _size_of_draws(drives: Drives, variant: Variant, whole: Mapping[float, Float
 
     What is left cannot be below what the noise of poses makes alone: draws that would leave less are not in the data.
     """
-    found, noise = {}, pose_noise(drives, variant.theta)
+    found, noise = {}, multistep_fit.pose_noise(drives, variant.theta)
     for horizon, squares in whole.items():
         windows = cut(drives, horizon)
-        blocks, floor = blocks_of(drives, windows), noise_floor(drives, windows, noise)[0]
+        blocks, floor = blocks_of(drives, windows), multistep_fit.noise_floor(drives, windows, noise)[0]
         share = ratio(_drawn_squares(drives, variant, windows, seed), squares, blocks)
         error = rmse(squares, blocks)
         sizes = []
@@ -184,10 +156,10 @@ def _size_of_draws(drives: Drives, variant: Variant, whole: Mapping[float, Float
 
 def _drawn_squares(drives: Drives, variant: Variant, windows: Windows, seed: int) -> Floats:
     """Mean squared distance [m²] of drawn and expected replays at every compared pose (M,)."""
-    expected = motion_in(drives, paths(drives, variant.theta), windows, in_one_go=True)
+    expected = motion_in(drives, innovations.paths(drives, variant.theta), windows, in_one_go=True)
     total = np.zeros(len(expected))
     for draw in range(DRAWS):
-        drawn = motion_in(drives, drawn_paths(drives, variant.theta, seed + draw), windows, in_one_go=True)
+        drawn = motion_in(drives, innovations.drawn_paths(drives, variant.theta, seed + draw), windows, in_one_go=True)
         total += np.square(drawn - expected)[:, :2].sum(axis=1)
     return total / DRAWS
 
@@ -201,19 +173,20 @@ def invisible_effects(model: Fit, taken: set[str]) -> tuple[str, ...]:
     for form in (form for form in forms if not form.form or form.effect not in plain):
         nats = 0.0
         if form.probes:
-            moved = theta_at({**model.theta, **form.fixed}, form.free, np.array(form.probes[len(form.probes) // 2]))
-            change = increments(model.drives, model.theta) - increments(model.drives, moved)
+            middle = np.array(form.probes[len(form.probes) // 2])
+            moved = innovations.theta_at({**model.theta, **form.fixed}, form.free, middle)
+            change = innovations.increments(model.drives, model.theta) - innovations.increments(model.drives, moved)
             column = model.whiten.whiten(change)[:, None]
             direction = project_out(model.slopes, column, np.ones(len(column)))[:, 0]
             nats = 0.5 * float(direction @ direction)
         best[form.effect] = max(best.get(form.effect, 0.0), nats)
     strike = rules.struck_share * float(responses(model, np.empty((len(model.innovations), 0))).size.sum()) / 2.0
-    best |= {name: strike for name in RANDOM_EFFECTS if name not in taken}
+    best |= {name: strike for name in innovations.RANDOM_EFFECTS if name not in taken}
     seen = {name for name, nats in best.items() if not nats < rules.visible_nats}
     return tuple(name for name in motion_effects(robot.catalogue) if name not in taken and name not in seen)
 
 
-GAINS: Mapping[str, Mapping[str, Coordinate]] = {
+GAINS: Mapping[str, Mapping[str, innovations.Coordinate]] = {
     "differential": {"left": ("wheel_gain.left",), "right": ("wheel_gain.right",)},
     "ackermann": {"driven": ("wheel_gain",), "steered": ("steering_gain",)},
 }
@@ -263,13 +236,13 @@ def _own_gains(drives: Drives, model: Fit) -> tuple[Floats, Floats]:
     columns = slopes(drives, whole.theta, coordinates, whole.whiten)
     label = np.repeat(drives.episode, 3)
     z = whole.innovations
-    gradient = sum_by(label, columns * clip_outliers(z)[:, None], count)
-    inner = columns * (np.abs(z) < HUBER)[:, None]
+    gradient = sum_by(label, columns * innovations.clip_outliers(z)[:, None], count)
+    inner = columns * (np.abs(z) < innovations.HUBER)[:, None]
     hessian = sum_by(label, columns[:, :, None] * inner[:, None, :], count) + KEPT_SOLVABLE * np.eye(2)
-    loud = np.maximum(1.0, sum_by(label, clip_outliers(z) ** 2, count) / np.bincount(label))
+    loud = np.maximum(1.0, sum_by(label, innovations.clip_outliers(z) ** 2, count) / np.bincount(label))
     inverse = np.linalg.inv(hessian)
     step = -np.einsum("eij,ej->ei", inverse, gradient)
-    low, high = spans(coordinates, drives)
+    low, high = innovations.spans(coordinates, drives)
     here = np.array([whole.theta[name] for (name,) in coordinates])
     variances = np.diagonal(inverse, axis1=1, axis2=2) * loud[:, None]
     return here + step * (high - low), np.sqrt(variances) * (high - low)

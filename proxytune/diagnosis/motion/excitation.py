@@ -27,9 +27,9 @@ from typing import NamedTuple
 import numpy as np
 
 from proxytune.diagnosis.motion.drives import Drives, Floats
-from proxytune.diagnosis.motion.evidence import AdoptedEffect, Findings
+from proxytune.diagnosis.motion.evidence import AdoptedEffect, Findings, Variant
 from proxytune.diagnosis.motion.fitting import Fit, fit_theta, intervals, loss_of, slopes
-from proxytune.diagnosis.motion.innovations import Coordinate, increments, paths, span, theta_at, whitener
+from proxytune.diagnosis.motion.innovations import increments, paths, span, theta_at, whitener
 from proxytune.diagnosis.motion.manoeuvres import LIBRARY, commands_of, mirrored
 from proxytune.diagnosis.motion.screening import Candidate, candidates
 from proxytune.space import Theta
@@ -175,18 +175,8 @@ def course_of(drives: Drives, limits: Limits) -> Course:
     return Course(limits, room, np.array((*(low + high) / 2.0, along * np.pi / 2.0)), drives)
 
 
-class Told(NamedTuple):
-    """What a drive tells apart, and how clearly a minute of it speaks."""
-
-    between: tuple[str, ...]
-    nats: float
-
-
-class RivalFit(NamedTuple):
-    """A model with a rival instead of an effect, fitted to what the effect does on some drive."""
-
-    theta: Theta
-    free: tuple[Coordinate, ...]
+Told = tuple[tuple[str, ...], float]
+"""What a drive tells apart, and how clearly a minute of it speaks [nats]."""
 
 
 class Rivals:
@@ -207,6 +197,7 @@ class Rivals:
         }
         self._truths: tuple[Theta, ...] = (model.theta, {**model.theta, **half})
         shown = [course.imagine(course.library, truth) for truth in self._truths]
+        # Models with a rival instead of the effect, fitted to what the effect does on some drive.
         self._fits = [[[self._first_fit(rival, batch)] for batch in shown] for rival in effect.rivals]
 
     def worth(self, commands: Floats) -> Floats:
@@ -234,9 +225,9 @@ class Rivals:
             apart = min(nats_apart(self._model, batch, self._refit(batch, one))[0] for one in fits)
             if (nats := float(apart) * 60.0 / self._course.seconds) > self.least:
                 clear[rival.effect] = nats
-        return Told((self._effect.effect, *clear), min(clear.values(), default=0.0))
+        return (self._effect.effect, *clear), min(clear.values(), default=0.0)
 
-    def _first_fit(self, rival: Candidate, batch: Drives) -> RivalFit:
+    def _first_fit(self, rival: Candidate, batch: Drives) -> Variant:
         """Fit a rival to what the effect does on imagined drives, from the best of the rival's probes."""
         model, effect = self._model, self._effect
         theta = {**{key: value for key, value in model.theta.items() if key not in effect.names}, **rival.fixed}
@@ -244,13 +235,13 @@ class Rivals:
         starts = [theta_at(theta, rival.free, np.array(probe)) for probe in rival.probes or ((),)]
         whiten = whitener(batch, model.noise)
         best = min(starts, key=lambda start: loss_of(batch, start, whiten))
-        return self._refit(batch, RivalFit(best, free))
+        return self._refit(batch, Variant(best, free))
 
-    def _refit(self, batch: Drives, rival: RivalFit) -> RivalFit:
-        return RivalFit(fit_theta(batch, rival.theta, rival.free, whitener(batch, self._model.noise)), rival.free)
+    def _refit(self, batch: Drives, rival: Variant) -> Variant:
+        return rival._replace(theta=fit_theta(batch, *rival, whitener(batch, self._model.noise)))
 
 
-def nats_apart(model: Fit, batch: Drives, rival: RivalFit) -> Floats:
+def nats_apart(model: Fit, batch: Drives, rival: Variant) -> Floats:
     """Evidence of each imagined drive against a rival near its fit [nats] (E,).
 
     It is n/2 log(1 + 2 T / n) with n innovations, for the rival's noise is fitted too and takes up a part.
@@ -297,7 +288,7 @@ class Unknown:
 
     def told(self, commands: Floats) -> Told:
         """Tell noise from what is missing."""
-        return Told(("noise", "what is missing"), float(self.worth(commands[None])[0]))
+        return ("noise", "what is missing"), float(self.worth(commands[None])[0])
 
 
 Worth = Callable[[Floats], Floats]
@@ -413,9 +404,7 @@ def design_drive(
     """
     course = course_of(found.model.drives, limits)
     contested = next((effect for effect in found.adopted if effect.rivals), None)
-    drive = None
-    if contested:
-        drive = _settle(Rivals(course, found.model, contested), course, found.model, seed)
+    drive = _settle(Rivals(course, found.model, contested), course, found.model, seed) if contested else None
     if drive is None and again:
         drive = _settle(Unknown(course, found.model, unseen), course, found.model, seed)
     return replace(drive, times=REPEATS) if drive and again else drive
@@ -423,8 +412,7 @@ def design_drive(
 
 def _settle(question: "Rivals | Unknown", course: Course, model: Fit, seed: int) -> NextDrive | None:
     """Design a drive for a question, and take it or a manoeuvre of the library; None where neither tells anything."""
-    sequences = Sequences(course, model, seed)
-    library = course.library
+    sequences, library = Sequences(course, model, seed), course.library
     for _ in range(ROUNDS):
         designed = sequences.evolve(question.worth)
         question.doubt(designed)
@@ -435,19 +423,20 @@ def _settle(question: "Rivals | Unknown", course: Course, model: Fit, seed: int)
     if not offers:
         return None
     told = {name: question.told(one) for name, one in offers.items()}
-    name = max(told, key=lambda one: told[one].nats * (1.0 if one != "designed" else 1.0 / SIMPLER))
-    if told[name].nats <= question.least:
+    name = max(told, key=lambda one: told[one][1] * (1.0 if one != "designed" else 1.0 / SIMPLER))
+    between, nats = told[name]
+    if nats <= question.least:
         return None
     length, width = course.room
     how = "the commands of next/commands.csv" if name == "designed" else LIBRARY[known][1]
     return NextDrive(
         name="the designed drive" if name == "designed" else name,
         description=f"{how}, {course.limits.seconds:g} s within {length:.1f} × {width:.1f} m, from its middle along it",
-        between=told[name].between,
-        nats_per_minute=told[name].nats,
+        between=between,
+        nats_per_minute=nats,
         commands=offers[name],
         rate_hz=course.rate_hz,
-        times=min(REPEATS, max(FEWEST, math.ceil(CLEAR_NATS * 60.0 / course.seconds / told[name].nats))),
+        times=min(REPEATS, max(FEWEST, math.ceil(CLEAR_NATS * 60.0 / course.seconds / nats))),
         room=course.room,
-        manoeuvre=next(((one, told[one].nats) for one in told if one != "designed"), None),
+        manoeuvre=next(((one, told[one][1]) for one in told if one != "designed"), None),
     )

@@ -258,10 +258,8 @@ def check_motion(name: str, drives: Drives) -> None:
         furthest = np.maximum(furthest, np.quantile((np.hypot(off[:, 0], off[:, 1]), off[:, 2]), 0.9, axis=1))
     way, turn = furthest
     if way < LEAST_TRAVEL_M and turn < LEAST_TURN_RAD:
-        raise LogError(
-            f"{name}: the robot got {way:.3f} m far and turned {turn:.2f} rad; nothing can be learnt from a robot that "
-            "stands still: check the poses, or drive"
-        )
+        got = f"{name}: the robot got {way:.3f} m far and turned {turn:.2f} rad"
+        raise LogError(f"{got}; nothing can be learnt from a robot that stands still: check the poses, or drive")
 
 
 def check_units(name: str, drives: Drives, theta: Theta) -> None:
@@ -269,17 +267,13 @@ def check_units(name: str, drives: Drives, theta: Theta) -> None:
     asked = increments(drives, theta)
     way, driven = float(np.abs(asked[:, 0]).sum()), float(drives.travel[:, 0].sum())
     if way > LEAST_TRAVEL_M and not 1.0 / MOST_TIMES < driven / way < MOST_TIMES:
-        raise LogError(
-            f"{name}: the poses say that the robot drove {driven:.3g} m where its commands say {way:.3g} m; check the "
-            "units (m, rad) and the robot's figures"
-        )
+        problem = f"{name}: the poses say that the robot drove {driven:.3g} m where its commands say {way:.3g} m"
+        raise LogError(f"{problem}; check the units (m, rad) and the robot's figures")
     moved = drives.measured
     course = float(np.degrees(np.arctan2(asked[:, 0] @ moved[:, 1], asked[:, 0] @ moved[:, 0])))
     if abs(course) > MOST_ASKEW_DEG:
-        raise LogError(
-            f"{name}: the robot drives {course:.0f}° from where its heading points; check the heading's zero, and "
-            "which way x and y go"
-        )
+        problem = f"{name}: the robot drives {course:.0f}° from where its heading points"
+        raise LogError(f"{problem}; check the heading's zero, and which way x and y go")
     turn, turned = asked[:, 2], moved[:, 2]
     if turn @ turned < -0.5 * np.sqrt((turn @ turn) * (turned @ turned)):
         raise LogError(f"{name}: the robot turns the other way than its commands say; check the signs, left and right")

@@ -262,47 +262,44 @@ def expected_theta(theta: Theta, rate_hz: float) -> dict[str, float]:
 
 def paths(drives: Drives, theta: Theta, duties: Floats | None = None) -> Floats:
     """The measured poses that a model expects from the origin (E, T + 1, 3), each episode in one go."""
-    train, measurement = _model(drives, theta)
-    return _walk_and_track(drives, _twists(drives, train, duties), measurement)
+    return tracked_paths(drives, theta, twists_of(drives, theta, duties))
 
 
-def twists_of(drives: Drives, theta: Theta) -> Floats:
+def twists_of(drives: Drives, theta: Theta, duties: Floats | None = None) -> Floats:
     """The motion that a model asks of the plant, tick by tick (E, T, 3): [m/s], [m/s], [rad/s]."""
-    return _twists(drives, _model(drives, theta)[0])
-
-
-def _twists(drives: Drives, train: Drivetrain, duties: Floats | None = None) -> Floats:
-    setting = _setting(drives)
+    train, setting = _model(drives, theta)[0], _setting(drives)
     if duties is not None:
         return np.asarray(train.apply(duties, train.begin(setting))[0])
     still = replace(setting, rest=np.zeros((len(drives.rest), 3)))
-    return np.asarray(train.motion.apply(train.ideal(_wheels(drives, train)), train.motion.begin(still))[0])
+    return np.asarray(train.motion.apply(train.ideal(wheel_speeds(drives, theta)), train.motion.begin(still))[0])
 
 
-def _arrived(drives: Drives, train: Drivetrain) -> Floats:
+def arrived_commands(drives: Drives, theta: Theta) -> Floats:
     """The commands that reach the motors (E, T, 2): many models differ in what comes after that."""
+    command = _model(drives, theta)[0].command
 
     def make() -> Floats:
-        return np.asarray(train.command.apply(drives.duties, train.command.begin(_setting(drives)))[0])
+        return np.asarray(command.apply(drives.duties, command.begin(_setting(drives)))[0])
 
-    return drives.arrivals.get(_values(train.command), make)
+    return drives.remember("arrived", _values(command), make)
+
+
+def wheel_speeds(drives: Drives, theta: Theta) -> Floats:
+    """The wheel speeds of a model (E, T, 2), as fractions of full speed; read only."""
+    train, _ = _model(drives, theta)
+
+    def make() -> Floats:
+        wheels = _turned(drives, train, arrived_commands(drives, theta))
+        wheels.setflags(write=False)
+        return wheels
+
+    return drives.remember("wheels", (_values(train.command), _values(train.actuation)), make)
 
 
 def _turned(drives: Drives, train: Drivetrain, arrived: Floats) -> Floats:
     """The wheel speeds (E, T, 2) that commands which reached the motors make."""
     memory = train.actuation.begin(_setting(drives))
     return np.asarray(train.actuation.apply(train.within_range(arrived), memory)[0])
-
-
-def _wheels(drives: Drives, train: Drivetrain) -> Floats:
-    """The wheel speeds (E, T, 2), as fractions of full speed; read only."""
-
-    def make() -> Floats:
-        wheels = _turned(drives, train, _arrived(drives, train))
-        wheels.setflags(write=False)
-        return wheels
-
-    return drives.turns.get((_values(train.command), _values(train.actuation)), make)
 
 
 def _values(chain: Chain) -> Hashable:
@@ -313,12 +310,6 @@ def _values(chain: Chain) -> Hashable:
     )
 
 
-def measured_paths(drives: Drives, theta: Theta, poses: Floats) -> Floats:
-    """Poses after each tick (E, T, 3) from the origin on, as a model's tracker sees them (E, T + 1, 3)."""
-    walked = np.concatenate((np.zeros((len(poses), 1, 3)), poses), axis=1)
-    return _track(drives, walked, _model(drives, theta)[1])
-
-
 def increments(drives: Drives, theta: Theta) -> Floats:
     """The motion between the measured poses (N, 3): forward, left [m], turn [rad], in the body frame; read only."""
 
@@ -327,7 +318,7 @@ def increments(drives: Drives, theta: Theta) -> Floats:
         made.setflags(write=False)
         return made
 
-    return drives.replays.get(tuple(theta.items()), make)
+    return drives.remember("increments", tuple(theta.items()), make)
 
 
 def increments_along(drives: Drives, walked: Floats) -> Floats:
@@ -339,7 +330,7 @@ def increments_along(drives: Drives, walked: Floats) -> Floats:
 
 def increments_of_twists(drives: Drives, theta: Theta, twists: Floats) -> Floats:
     """The increments that these twists of every tick (E, T, 3) make, as a model's tracker sees them."""
-    return increments_along(drives, _walk_and_track(drives, twists, _model(drives, theta)[1]))
+    return increments_along(drives, tracked_paths(drives, theta, twists))
 
 
 def disturbed_increments(drives: Drives, theta: Theta, extra: Floats) -> Floats:
@@ -353,17 +344,16 @@ def window_paths(drives: Drives, theta: Theta, begin: Whole, length: int) -> Flo
     A window starts from the measured pose, and from measured wheel speeds where there are any. The commands before it
     count; nothing measured after it does. Commands after an episode's end are those at its end.
     """
-    train, measurement = _model(drives, theta)
-    return _walk_and_track(drives, _window_twists(drives, train, begin, length), measurement)
+    return tracked_paths(drives, theta, window_twists(drives, theta, begin, length))
 
 
-def window_twists(drives: Drives, theta: Theta, begin: Whole, length: int) -> Floats:
-    """The motion that a model asks of the plant in such windows (W, length, 3): [m/s], [m/s], [rad/s]."""
-    return _window_twists(drives, _model(drives, theta)[0], begin, length)
+def window_twists(drives: Drives, theta: Theta, begin: Whole, length: int, added: Floats | None = None) -> Floats:
+    """The motion that a model asks of the plant in such windows (W, length, 3): [m/s], [m/s], [rad/s].
 
-
-def _window_twists(drives: Drives, train: Drivetrain, begin: Whole, length: int, added: Floats | None = None) -> Floats:
-    whole, wheels = _window_wheels(drives, train, begin, length, added)
+    Something may be added to the commands that arrive (E, T, 2).
+    """
+    train, _ = _model(drives, theta)
+    whole, wheels = _window_wheels(drives, theta, begin, length, added)
     if not train.motion.effects:
         return train.ideal(wheels)
     asked, driven = train.ideal(whole), replace(_setting(drives), rest=np.zeros((len(whole), 3)))
@@ -375,20 +365,19 @@ def _window_twists(drives: Drives, train: Drivetrain, begin: Whole, length: int,
 
 
 def _window_wheels(
-    drives: Drives, train: Drivetrain, begin: Whole, length: int, added: Floats | None
+    drives: Drives, theta: Theta, begin: Whole, length: int, added: Floats | None
 ) -> tuple[Floats, Floats]:
-    """Wheel speeds in whole drives (E, T, 2), and in windows (W, length, 2), there from measured ones on if any are.
-
-    Something may be added to the commands that arrive (E, T, 2).
-    """
-    whole = _wheels(drives, train) if added is None else _turned(drives, train, _arrived(drives, train) + added)
+    """Wheel speeds in whole drives (E, T, 2), and in windows (W, length, 2), there from measured ones on if any are."""
+    (train, _), commands = _model(drives, theta), arrived_commands(drives, theta)
+    commands = commands if added is None else commands + added
+    whole = wheel_speeds(drives, theta) if added is None else _turned(drives, train, commands)
     episode, start = drives.episode[begin], drives.first[begin]
     ticks = np.minimum(start[:, None] + np.arange(length), whole.shape[1] - 1)
     if drives.wheels is None:
         return whole, rows_at(whole, episode[:, None], ticks)
-    arrived = train.within_range(_arrived(drives, train) + (0.0 if added is None else added))
+    asked = rows_at(train.within_range(commands), episode[:, None], ticks)
     turning = replace(_setting(drives), rest=drives.wheels[episode, start])
-    return whole, train.actuation.apply(rows_at(arrived, episode[:, None], ticks), train.actuation.begin(turning))[0]
+    return whole, train.actuation.apply(asked, train.actuation.begin(turning))[0]
 
 
 LearntMotion = list[tuple[Floats, Floats]]
@@ -406,20 +395,27 @@ def window_command_features(
     drives: Drives, theta: Theta, learnt: Learnt, begin: Whole, length: int
 ) -> Iterator[LearntMotion]:
     """Motion that each weight over commands adds in such windows: every one is a replay of the drives."""
-    train, _ = _model(drives, theta)
-    arrived = _arrived(drives, train)
-    asked = _window_twists(drives, train, begin, length)
+    arrived, asked = arrived_commands(drives, theta), window_twists(drives, theta, begin, length)
     for features in learnt.commands.features(arrived, learnt.commands.begin(_setting(drives))):
         moved = np.empty((3, features.shape[-1], *asked.shape[:2]))
         for number, column in enumerate(np.moveaxis(features, -1, 0)):
-            twists = _window_twists(drives, train, begin, length, SMALL_DUTY * column)
+            twists = window_twists(drives, theta, begin, length, SMALL_DUTY * column)
             np.divide(np.moveaxis(twists - asked, -1, 0), SMALL_DUTY, out=moved[:, number])
         yield [(np.moveaxis(part, 0, -1), unit) for part, unit in zip(moved, np.eye(3), strict=True)]
 
 
 def tracked_paths(drives: Drives, theta: Theta, twists: Floats) -> Floats:
     """Measured poses, from the origin on, that twists lead to (W, length + 1, 3)."""
-    return _walk_and_track(drives, twists, _model(drives, theta)[1])
+    return tracked(drives, theta, integrate_twists(twists, 1.0 / drives.tick_hz))
+
+
+def tracked(drives: Drives, theta: Theta, walked: Floats) -> Floats:
+    """Paths (…, 3) as a model's tracker sees them."""
+    _, measurement = _model(drives, theta)
+    if not measurement.effects:
+        return walked
+    rest = replace(_setting(drives), rest=walked[:, 0])
+    return np.asarray(measurement.apply(walked, measurement.begin(rest))[0])
 
 
 def _window_setting(drives: Drives, begin: Whole, before: Floats) -> FilterContext:
@@ -434,15 +430,9 @@ def _window_setting(drives: Drives, begin: Whole, before: Floats) -> FilterConte
     )
 
 
-def wheel_speeds(drives: Drives, theta: Theta) -> Floats:
-    """The wheel speeds of a model (E, T, 2), as fractions of full speed."""
-    return _wheels(drives, _model(drives, theta)[0])
-
-
 def drawn_wheel_speeds(drives: Drives, theta: Theta, seed: int) -> Floats:
     """The wheel speeds (E, T, 2) with random effects as one seed draws them, instead of as expected."""
-    robot = drives.robot
-    train = drivetrain(robot, effects_from({**robot.theta, **theta}, robot.figures, robot.catalogue))
+    train, _ = _chains(drives, {**drives.robot.theta, **theta})
     memory = train.begin(replace(_setting(drives), seed=seed))
     arrived, _ = train.command.apply(drives.duties, memory.command)
     return np.asarray(train.actuation.apply(train.within_range(arrived), memory.actuation)[0])
@@ -450,39 +440,29 @@ def drawn_wheel_speeds(drives: Drives, theta: Theta, seed: int) -> Floats:
 
 def drawn_paths(drives: Drives, theta: Theta, seed: int) -> Floats:
     """The paths (E, T + 1, 3) with random effects as one seed draws them, instead of as expected."""
-    robot = drives.robot
-    effects = effects_from({**robot.theta, **theta}, robot.figures, robot.catalogue)
-    train = drivetrain(robot, effects)
+    train, _ = _chains(drives, {**drives.robot.theta, **theta})
     twists, _ = train.apply(drives.duties, train.begin(replace(_setting(drives), seed=seed)))
-    return _walk_and_track(drives, np.asarray(twists), stage_chain(effects, Stage.MEASUREMENT))
-
-
-def arrived_commands(drives: Drives, theta: Theta) -> Floats:
-    """The commands that reach the motors (E, T, 2)."""
-    return _arrived(drives, _model(drives, theta)[0])
+    return tracked_paths(drives, theta, np.asarray(twists))
 
 
 def _model(drives: Drives, theta: Theta) -> tuple[Drivetrain, Chain]:
-    robot = drives.robot
-    effects = effects_from(expected_theta({**robot.theta, **theta}, drives.rate_hz), robot.figures, robot.catalogue)
-    return drivetrain(robot, effects), stage_chain(effects, Stage.MEASUREMENT)
+    """A model's drivetrain and its tracker, what is drawn in it as expected."""
+
+    def make() -> tuple[Drivetrain, Chain]:
+        return _chains(drives, expected_theta({**drives.robot.theta, **theta}, drives.rate_hz))
+
+    return drives.remember("model", tuple(theta.items()), make)
+
+
+def _chains(drives: Drives, theta: Theta) -> tuple[Drivetrain, Chain]:
+    effects = effects_from(theta, drives.robot.figures, drives.robot.catalogue)
+    return drivetrain(drives.robot, effects), stage_chain(effects, Stage.MEASUREMENT)
 
 
 def _setting(drives: Drives) -> FilterContext:
     nominal: Mapping[str, float] = {**drives.robot.figures, "control_rate": drives.rate_hz}
     setting = FilterContext(drives.tick_hz, drives.rest, nominal)
     return replace(setting, headings=drives.headings, places=drives.places, angles=drives.angles)
-
-
-def _walk_and_track(drives: Drives, twists: Floats, measurement: Chain) -> Floats:
-    return _track(drives, integrate_twists(twists, 1.0 / drives.tick_hz), measurement)
-
-
-def _track(drives: Drives, walked: Floats, measurement: Chain) -> Floats:
-    if not measurement.effects:
-        return walked
-    rest = replace(_setting(drives), rest=walked[:, 0])
-    return np.asarray(measurement.apply(walked, measurement.begin(rest))[0])
 
 
 Coordinate = tuple[str, ...]

@@ -112,13 +112,12 @@ def reaction(drives: Drives, speeds: Speeds, reach_s: float) -> Reaction:
 def reaction_at(drives: Drives, speeds: Speeds, latency_s: float) -> Reaction:
     """The best reaction with this latency."""
     commanded = _CommandedSpeeds(drives, abs(latency_s))
-    top = float(np.sqrt(LONGEST_TIME_CONSTANT_S))
-    found = minimize_scalar(
-        lambda root: _misfit(commanded.reaction(speeds, latency_s, root**2)),
-        bounds=(0.0, top),
-        method="bounded",
-        options={"xatol": 5e-3},
-    )
+
+    def left(root: float) -> float:
+        return _misfit(commanded.reaction(speeds, latency_s, root**2))
+
+    bounds = (0.0, float(np.sqrt(LONGEST_TIME_CONSTANT_S)))
+    found = minimize_scalar(left, bounds=bounds, method="bounded", options={"xatol": 5e-3})
     return commanded.reaction(speeds, latency_s, float(found.x) ** 2)
 
 
@@ -174,20 +173,18 @@ class _CommandedSpeeds:
 
     def reactions(self, speeds: Speeds, latencies_s: Sequence[float], constant_s: float) -> list[Reaction]:
         """The reaction with the best gains at each latency."""
-        asked = zip(latencies_s, self.speeds(speeds, latencies_s, constant_s), strict=True)
-        return [_with_best_gains(speeds, one, latency_s, constant_s) for latency_s, one in asked]
+        found, size = list[Reaction](), speeds.values.std(axis=0) + 1e-9
+        for latency_s, asked in zip(latencies_s, self.speeds(speeds, latencies_s, constant_s), strict=True):
+            gains = np.linalg.pinv(asked.T @ asked, hermitian=True) @ (asked.T @ speeds.values)
+            rest = speeds.values - asked @ gains
+            squares = ((rest / size) ** 2).sum(axis=1)
+            found.append(Reaction(latency_s, constant_s, gains, rest.std(axis=0) + 1e-9, squares))
+        return found
 
     def reaction(self, speeds: Speeds, latency_s: float, constant_s: float) -> Reaction:
         """The reaction with the best gains at one latency."""
         (found,) = self.reactions(speeds, (latency_s,), constant_s)
         return found
-
-
-def _with_best_gains(speeds: Speeds, asked: Floats, latency_s: float, constant_s: float) -> Reaction:
-    gains = np.linalg.pinv(asked.T @ asked, hermitian=True) @ (asked.T @ speeds.values)
-    rest = speeds.values - asked @ gains
-    size = speeds.values.std(axis=0) + 1e-9
-    return Reaction(latency_s, constant_s, gains, rest.std(axis=0) + 1e-9, ((rest / size) ** 2).sum(axis=1))
 
 
 def _misfit(found: Reaction) -> float:
@@ -287,13 +284,7 @@ LEAST_DRIFT_S = 0.02
 
 
 class Drift(NamedTuple):
-    """Two clocks that run at different rates: poses are stamped so much later with every second [s/s].
-
-    Attributes:
-        rate: How much later.
-        deviation: Its standard deviation.
-        span_s: How long the log lasts.
-    """
+    """Two clocks that run at different rates: poses are stamped so much later with every second [s/s] of its span."""
 
     rate: float
     deviation: float
@@ -310,11 +301,7 @@ def clock_drift(blocks: Blocks, times: Floats, latencies: Floats) -> Drift | Non
 
     A grid of rates is looked through, and Gauss-Newton steps lead on from its best. Its deviation is that of the slopes
     of pieces of the drives: where a part of them alone grows late, their robot or their own clock does.
-
-    Args:
-        blocks: Squares left over at each latency, by blocks of time.
-        times: The middle of each block in the log's time (B,) [s].
-        latencies: Those latencies [s].
+    `times` are the middles of the blocks in the log's time (B,) [s].
     """
     middle, step = times - times.mean(), float(latencies[1] - latencies[0])
     span = float(np.ptp(times))
@@ -424,12 +411,9 @@ def stretches(
         drive = Blocks(*(part[own] for part in blocks))
         found = _jumps_at_steps(drive, latencies, steps, usual, at_steps=at_steps)
         edges = [0.0, *(float(blocks.number[own[at]] * LATENCY_BLOCK_S) for at, _ in found), np.inf]
-        margin = [0.0, *([LATENCY_BLOCK_S] * len(found)), 0.0]
+        margin = np.array([0.0, *([LATENCY_BLOCK_S] * len(found)), 0.0])
         end = float(episode.times[-1] - episode.times[0])
-        spans = [
-            (low + before, high - after)
-            for low, high, before, after in zip(edges, edges[1:], margin, margin[1:], strict=False)
-        ]
+        spans = list(zip((edges + margin)[:-1].tolist(), (edges - margin)[1:].tolist(), strict=True))
         kept.append(max(spans, key=lambda span: min(span[1], end) - span[0]))
         jumps += [Jump(episode.name, float(episode.times[0]) + edges[1 + k], by) for k, (_, by) in enumerate(found)]
     return kept, tuple(jumps)

@@ -14,15 +14,15 @@ import numpy as np
 from scipy.optimize import least_squares, nnls
 from scipy.stats import chi2
 
-from proxytune.diagnosis.motion.drives import Drives, Floats, Recent
+from proxytune.diagnosis.motion.drives import SEVERAL, Drives, Floats, Recent
 from proxytune.diagnosis.motion.fitting import STEP, Fit, evaluate, sandwich_intervals
 from proxytune.diagnosis.motion.innovations import (
     Coordinate,
     increments,
-    measured_paths,
     smooth_coordinates,
     spans,
     theta_at,
+    tracked,
     twists_of,
 )
 from proxytune.diagnosis.motion.prediction import (
@@ -94,7 +94,7 @@ def fit_windows(drives: Drives, theta: Theta, free: Sequence[Coordinate], window
         return problem.at(np.clip(found.x, 0.0, 1.0))
 
     asked = (tuple(theta.items()), fitted, windows.begin.tobytes(), hash(windows.increment.tobytes()))
-    return dict(drives.fits.get(asked, make))
+    return dict(drives.remember("windows", asked, make, SEVERAL))
 
 
 class _Problem(NamedTuple):
@@ -162,10 +162,15 @@ def compare_errors(drives: Drives, one: Mapping[float, Floats], other: Mapping[f
     return {h: ratio(squares, other[h], blocks_of(drives, cut(drives, h)), shown_at) for h, squares in one.items()}
 
 
+def squared_errors(drives: Drives, theta: Theta) -> dict[float, Floats]:
+    """Squared distances of a model's poses from measured ones [m²], by horizon [s]."""
+    return {h: pose_errors(drives, theta, cut(drives, h))[:, 0] ** 2 for h in horizons(drives)}
+
+
 def fit_multistep(fitted: Fit) -> tuple[Fit, MultistepFit | None]:
     """Fit the parameters to windows, and keep that if held-out windows show that it helps and nowhere harms."""
     drives = fitted.drives
-    plain = {h: pose_errors(drives, fitted.theta, cut(drives, h))[:, 0] ** 2 for h in horizons(drives)}
+    plain = squared_errors(drives, fitted.theta)
     best: tuple[float, float, dict[float, Ratio]] | None = None
     for length in [s for s in FITTED_S if s in plain]:
         ratios = compare_errors(drives, held_out_squares(drives, fitted.theta, fitted.free, length), plain)
@@ -273,9 +278,9 @@ def bullet_pose_errors(drives: Drives, theta: Theta, windows: Windows) -> Floats
     Each episode is driven in one go from its first command; windows compare the motion since their beginning.
     """
     twists = twists_of(drives, theta)
-    poses = np.zeros((len(twists), twists.shape[1], 3))
+    walked = np.zeros((len(twists), twists.shape[1] + 1, 3))
     for episode in np.unique(drives.episode):
         last = int(drives.last[drives.episode == episode].max())
         with BulletPlant(drives.robot, np.zeros(3), 1.0 / drives.tick_hz) as plant:
-            poses[episode, :last], _ = plant.move(twists[episode, :last])
-    return pose_errors_along(drives, measured_paths(drives, theta, poses), windows)
+            walked[episode, 1 : last + 1], _ = plant.move(twists[episode, :last])
+    return pose_errors_along(drives, tracked(drives, theta, walked), windows)

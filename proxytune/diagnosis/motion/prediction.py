@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from scipy.stats import t as student, wilcoxon
 
 from proxytune.diagnosis.answer import RULES
+from proxytune.diagnosis.motion import innovations
 from proxytune.diagnosis.motion.drives import (
     Drives,
     Floats,
@@ -27,17 +28,6 @@ from proxytune.diagnosis.motion.drives import (
     path_between,
     relative,
     sum_by,
-)
-from proxytune.diagnosis.motion.innovations import (
-    Coordinate,
-    LearntMotion,
-    integrate_twists,
-    nudged,
-    tracked_paths,
-    window_command_features,
-    window_features,
-    window_paths,
-    window_twists,
 )
 from proxytune.driving import Robot
 from proxytune.effects import Learnt, is_learnt
@@ -88,7 +78,7 @@ def predicted_motion(drives: Drives, theta: Theta, windows: Windows) -> Floats:
     """The model's motion since each window's beginning (M, 3): [m], [m], [rad]."""
     return np.concatenate(
         [
-            motion_in(some, window_paths(some, theta, own.begin, length_of(some, own)), own)
+            motion_in(some, innovations.window_paths(some, theta, own.begin, length_of(some, own)), own)
             for some, own in _batches(drives, windows)
         ]
     )
@@ -244,8 +234,12 @@ def predict(log: Log, robot: Robot, theta: Theta, horizon_s: float) -> pd.DataFr
     if not any(len(rows) for rows in starts):
         raise LogError(f"{log.name}: no measured pose to start a window from")
     ticks = round(whole.tick_hz / log.rate_hz)
-    windows = _windows(whole, log.episodes, starts, ticks)
-    walked = window_paths(windows, theta, np.arange(len(windows.first)), reach * ticks)
+    # Drives whose increments are the windows' beginnings alone.
+    first, number = np.concatenate(starts) * ticks, np.repeat(np.arange(len(starts)), [len(rows) for rows in starts])
+    begins = [as_measured(one)[0][rows] for one, rows in zip(log.episodes, starts, strict=True)]
+    both, block = np.repeat(np.concatenate(begins)[:, None], 2, axis=1), np.zeros_like(first)
+    windows = replace(whole, episode=number, first=first, last=first, poses=both, block=block)
+    walked = innovations.window_paths(windows, theta, np.arange(len(windows.first)), reach * ticks)
     poses = _place_at(windows.poses[:, 0], *_at_samples(walked, log.episodes, starts, ticks))
     cuts = np.cumsum([len(rows) for rows in starts])[:-1]
     parts = zip(log.episodes, starts, np.split(poses, cuts), strict=True)
@@ -290,15 +284,6 @@ def _starts(episode: LogEpisode, reach: int) -> Whole:
         starts.append(int(known[later]))
         at = starts[-1] + reach
     return np.array(starts, dtype=int)
-
-
-def _windows(whole: Drives, episodes: Sequence[LogEpisode], starts: Sequence[Whole], ticks: int) -> Drives:
-    """Drives whose increments are the windows' beginnings alone."""
-    poses = np.concatenate([as_measured(one)[0][rows] for one, rows in zip(episodes, starts, strict=True)])
-    first = np.concatenate(starts) * ticks
-    number = np.repeat(np.arange(len(episodes)), [len(rows) for rows in starts])
-    both = np.repeat(poses[:, None], 2, axis=1)
-    return replace(whole, episode=number, first=first, last=first, poses=both, block=np.zeros_like(first))
 
 
 def _place_at(start: Floats, walked: Floats, origin: Floats) -> Floats:
@@ -383,7 +368,7 @@ def choose_windows(drives: Drives) -> Windows:
     return Windows(windows.begin, windows.window[last], windows.increment[last])
 
 
-def slopes_of(drives: Drives, theta: Theta, offered: Learnt, free: Sequence[Coordinate] = ()) -> Slopes:
+def slopes_of(drives: Drives, theta: Theta, offered: Learnt, free: Sequence[innovations.Coordinate] = ()) -> Slopes:
     """Linearise windows in the weights of the curves offered, around a model that may have a learnt effect itself.
 
     Columns of free coordinates come last, by the share of their range.
@@ -395,16 +380,16 @@ def slopes_of(drives: Drives, theta: Theta, offered: Learnt, free: Sequence[Coor
     named = {name: value for name, value in theta.items() if not is_learnt(name)}
 
     def walk(values: Theta) -> tuple[Floats, Floats, Floats]:
-        twists = window_twists(drives, values, begin, length)
-        walked = tracked_paths(drives, values, twists)
+        twists = innovations.window_twists(drives, values, begin, length)
+        walked = innovations.tracked_paths(drives, values, twists)
         return twists, walked, motion_in(drives, walked, windows)
 
     twists, walked, predicted = walk(theta)
     measured = measured_motion(drives, windows)
     way = float(np.median(np.hypot(measured[:, 0], measured[:, 1])))
     features = chain(
-        window_features(drives, named, offered, begin, length),
-        window_command_features(drives, named, offered, begin, length),
+        innovations.window_features(drives, named, offered, begin, length),
+        innovations.window_command_features(drives, named, offered, begin, length),
     )
     changes = _pose_slopes(twists, walked, features, (window, tick - 1), 1.0 / drives.tick_hz)
     # Seen from the frame in which each window's tracked place begins.
@@ -413,23 +398,19 @@ def slopes_of(drives: Drives, theta: Theta, offered: Learnt, free: Sequence[Coor
     y = sine * changes[:, 0] + cosine * changes[:, 1]
     columns, scale = [np.stack((x, y, way * changes[:, 2]), axis=1)], (1.0, 1.0, way)
     for coordinate in free:
-        there, step = nudged(drives, theta, coordinate, STEP)
+        there, step = innovations.nudged(drives, theta, coordinate, STEP)
         columns.append(((walk(there)[2] - predicted) * scale / step)[..., None])
     return Slopes((measured - predicted) * scale, np.concatenate(columns, axis=2), drives.block[begin[window]])
 
 
 def _pose_slopes(
-    twists: Floats,
-    walked: Floats,
-    features: Iterable[LearntMotion],
-    at: tuple[Whole, Whole],
-    tick_s: float,
+    twists: Floats, walked: Floats, features: Iterable[innovations.LearntMotion], at: tuple[Whole, Whole], tick_s: float
 ) -> Floats:
     """Change of compared poses (M, 3, weights) per weight of the curves, to first order; places as complex numbers.
 
     `at` is the window and tick of each pose.
     """
-    poses = integrate_twists(twists, tick_s)
+    poses = innovations.integrate_twists(twists, tick_s)
     cosine, sine = cosine_and_sine(poses[:, 1:, 2] - twists[..., 2] * (tick_s / 2.0))
     axle = 0.5 * (poses[:, 1:] + poses[:, :-1])
     # The way of 1 m/s within a tick; how far a turn of 1 rad/s in it moves places, less what a turn after it moves.

@@ -198,16 +198,10 @@ FURTHEST = 2.0
 
 
 class ScreenedCandidate(NamedTuple):
-    """A candidate with its score-test gain.
+    """A candidate with the log-likelihood gain of its score test [nats], and the same on blocks that were not fitted.
 
-    Attributes:
-        candidate: The form.
-        start: Values of its coordinates after the step.
-        probe: The probe that the step set out for.
-        gain: Gain of the step in log-likelihood [nats].
-        held_out: The same on blocks that it was not fitted to [nats].
-        p_value: How often chance gains as much with any form of any effect.
-        column: The direction in the innovations that it explains, free parameters projected out (3N,).
+    Its coordinates are at `start` after the step, which set out for the probe. Chance gains as much with any form of
+    any effect as often as `p_value`; `column` is the direction in the innovations that it explains (3N,).
     """
 
     candidate: Candidate

@@ -121,11 +121,8 @@ def search(base: Fit, seed: int, report: Progress, without: Collection[str] = ()
             break
         # Where a signal explains more, an effect is still added if it says enough beside it; the first never is, for it
         # might be wrong.
-        if (
-            not of_car
-            and unnamed
-            and not (adopted and best.gain > max(rules.curve_margin_nats, rules.share_of_curve * unnamed[0].gain))
-        ):
+        enough = max(rules.curve_margin_nats, rules.share_of_curve * unnamed[0].gain) if unnamed else 0.0
+        if unnamed and not of_car and not (adopted and best.gain > enough):
             break
         if best.random is not None:
             best = fit_random(model, infer_size_indirectly(model, best.random, seed))

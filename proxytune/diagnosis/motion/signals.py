@@ -76,12 +76,8 @@ class _Motion:
     commands: Floats
 
 
-def signal_groups(fitted: Fit) -> Iterator[SignalGroup]:
-    """Every signal group of these drives, seen with the fitted model, as it is asked for."""
-    return (group for group, _ in _with_twists(fitted))
-
-
-def _with_twists(fitted: Fit) -> Iterator[tuple[SignalGroup, Floats]]:
+def signal_groups(fitted: Fit) -> Iterator[tuple[SignalGroup, Floats]]:
+    """Every signal group of these drives, seen with the fitted model, with its twists, as it is asked for."""
     motion = _motion(fitted)
     of_wheels = (
         _wheel_difference,
@@ -285,7 +281,7 @@ def fit_curves(fitted: Fit) -> list[SignalCurve]:
     The best few are fitted again with the noise that they leave: a candidate's noise is fitted too.
     """
     plain = float(held_out_log_likelihood(fitted).sum())
-    found = [_fit_curve(fitted, group, _columns(fitted, added), plain) for group, added in _with_twists(fitted)]
+    found = [_fit_curve(fitted, group, _columns(fitted, added), plain) for group, added in signal_groups(fitted)]
     found.sort(key=lambda curve: -curve.gain)
     promising = [curve for curve in found[:REFITTED] if curve.gain > 0.0]
     again = [_fit_with_own_noise(fitted, curve, plain) for curve in promising]

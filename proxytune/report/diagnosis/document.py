@@ -1,5 +1,6 @@
 """JSON document of a diagnosis, of motion and camera, and the extended model as model.toml."""
 
+import dataclasses
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -18,7 +19,9 @@ from proxytune.diagnosis import (
     HorizonError,
     Learning,
     LogDiagnosis,
+    PictureError,
     Ratio,
+    Rmse,
     RobotClusters,
     main_error,
 )
@@ -103,7 +106,7 @@ def motion_document(diagnosis: Diagnosis) -> dict[str, Any]:
         "errors": [_error_document(error) for error in diagnosis.errors],
         "error_on_bullet": _error_document(diagnosis.confirmed) if diagnosis.confirmed else None,
         "fitted_to_windows": polish and {"horizon_s": polish.horizon_s, "error_ratio": ratios_document(polish.ratios)},
-        "noise": {"drive": list(diagnosis.noise.drive), "pose": list(diagnosis.noise.pose)},
+        "noise": _plain(diagnosis.noise),
         "could_not_be_seen": list(diagnosis.could_not_be_seen),
         "next_manoeuvre": manoeuvre,
         "fitted_s": diagnosis.parts.fitted.seconds,
@@ -115,10 +118,7 @@ def motion_document(diagnosis: Diagnosis) -> dict[str, Any]:
 
 def estimates_document(estimates: Mapping[str, Estimate]) -> dict[str, Any]:
     """Values with their intervals and units, by name; None where one is not finite."""
-    return {
-        name: {"value": _number(one.value), "interval": _interval(one.interval), "unit": one.unit}
-        for name, one in estimates.items()
-    }
+    return {name: _plain(one) for name, one in estimates.items()}
 
 
 def _parameters_document(
@@ -180,12 +180,9 @@ def _error_document(error: HorizonError) -> dict[str, Any]:
     return {
         "horizon_s": error.horizon_s,
         "windows": error.windows,
-        "before": error.before.value,
-        "before_interval": list(error.before.interval),
-        "after": error.after.value,
-        "after_interval": list(error.after.interval),
-        "ratio": error.ratio.value,
-        "ratio_interval": list(error.ratio.interval),
+        **_with_interval("before", error.before),
+        **_with_interval("after", error.after),
+        **_with_interval("ratio", error.ratio),
         "noise_floor": error.floor.lower,
         "noise_floor_upper": error.floor.upper,
         "not_repeated": ratio_document(error.floor.again.share) if error.floor.again else None,
@@ -242,12 +239,7 @@ def learnt_document(learning: Learning) -> dict[str, Any]:
         "ratio": ratios_document({error.horizon_s: error.ratio for error in learning.errors}),
         "guard": ratios_document(beside.guard),
         "errors": [
-            {
-                "horizon_s": error.horizon_s,
-                "after": error.after.value,
-                "after_interval": list(error.after.interval),
-                "heading": error.heading.value,
-            }
+            {"horizon_s": error.horizon_s, **_with_interval("after", error.after), "heading": error.heading.value}
             for error in learning.errors
         ],
         "names_doubtful": learning.names_doubtful,
@@ -268,11 +260,11 @@ def ratios_document(ratios: Mapping[float, Ratio]) -> dict[str, dict[str, Any]]:
 
 def camera_document(diagnosis: CameraDiagnosis) -> dict[str, Any]:
     """Everything that `diagnose --json` prints of the camera: plain numbers, None where there is none."""
-    views, laid = diagnosis.named.full.views, diagnosis.laid
+    views = diagnosis.named.full.views
     place, turn = views.position_m / views.tracks.share, np.degrees(views.heading_rad) / views.tracks.share
     keys = ("nats", "share", "rms_px")
     left = [
-        {key: _number(getattr(one, key)) for key in keys} | {"open": bool(one.significant)}
+        {key: _plain(getattr(one, key)) for key in keys} | {"open": bool(one.significant)}
         for one in diagnosis.residual_fields
     ]
     return {
@@ -281,38 +273,18 @@ def camera_document(diagnosis: CameraDiagnosis) -> dict[str, Any]:
         "effects": camera_effects(diagnosis),
         "immaterial": [_camera_effect_document(one, diagnosis, diagnosis.dropped) for one in diagnosis.negligible],
         "extended": estimates_document(diagnosis.theta),
-        "candidates": [{"name": "+".join(one.effects), "loss": _number(one.loss)} for one in diagnosis.candidates],
+        "candidates": [{"name": "+".join(one.effects), "loss": _plain(one.loss)} for one in diagnosis.candidates],
         "error": _comparison_document(diagnosis.pixels),
         "grey_error": _comparison_document(diagnosis.grey),
         "fixed_to_camera": dict(zip(("before", "after"), left, strict=True)),
-        "blemishes": [
-            {
-                "columns": [int(end) for end in one.columns],
-                "rows": [int(end) for end in one.rows],
-                "contrast": _number(one.contrast),
-                "share": _number(one.share),
-            }
-            for one in diagnosis.blemishes
-        ],
+        "blemishes": _plain(diagnosis.blemishes),
         "could_not_be_seen": list(diagnosis.could_not_be_seen),
         "next_views": list(diagnosis.next_views),
-        "map": {
-            "offset": estimates_document(laid.offset),
-            "lines": [
-                {
-                    "line": one.line,
-                    "stretch": int(one.stretch),
-                    "right_m": _number(one.right_m),
-                    "interval": _interval(one.interval),
-                }
-                for one in laid.lines
-            ],
-            "widths": estimates_document(laid.widths),
-        },
-        "matched_share": _number(diagnosis.matched),
+        "map": _plain(diagnosis.laid),
+        "matched_share": _plain(diagnosis.matched),
         "frames": {"used": len(diagnosis.gathered.numbers), "of": len(diagnosis.gathered.frames.paths)},
         # The tracker's, before its poses are smoothed, as log.toml states it.
-        "pose_scatter": {"position_m": _number(place), "heading_deg": _number(float(turn))},
+        "pose_scatter": {"position_m": _plain(place), "heading_deg": _plain(turn)},
         "notes": list(diagnosis.notes),
     }
 
@@ -322,12 +294,21 @@ def camera_effects(diagnosis: CameraDiagnosis) -> list[dict[str, Any]]:
     return [_camera_effect_document(effect, diagnosis, diagnosis.theta) for effect in diagnosis.effects]
 
 
-def _number(value: float) -> float | None:
-    return float(value) if math.isfinite(value) else None
+def _plain(value: Any) -> Any:
+    """A record by its own names, a sequence or a number as JSON has them; None where a number is not finite."""
+    if dataclasses.is_dataclass(value):
+        return {field.name: _plain(getattr(value, field.name)) for field in dataclasses.fields(value)}
+    if isinstance(value, Mapping):
+        return {name: _plain(one) for name, one in value.items()}
+    if isinstance(value, tuple):
+        return [_plain(one) for one in value]
+    value = value.item() if isinstance(value, np.generic) else value
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def _interval(ends: tuple[float, float]) -> list[float | None]:
-    return [_number(end) for end in ends]
+def _with_interval(name: str, one: Rmse | Ratio | PictureError) -> dict[str, Any]:
+    """A figure and, under a name of its own, its interval."""
+    return {name: _plain(one.value), f"{name}_interval": _plain(one.interval)}
 
 
 def _camera_effect_document(
@@ -336,23 +317,21 @@ def _camera_effect_document(
     return {
         "name": effect.effect,
         "parameters": _parameters_document(effect, theta, diagnosis.named.full.views.optics.robot.catalogue),
-        "held_out_gain": None if effect.nats is None else _number(effect.nats),
+        "held_out_gain": _plain(effect.nats),
         "indistinguishable_from": list(effect.rivals),
-        "error_without": _number(effect.error_without) if effect.error_without is not None else None,
+        "error_without": _plain(effect.error_without),
     }
 
 
 def camera_noise_floor(error: Comparison) -> float | None:
     """The error that no camera could remove; None where it is not known."""
-    return None if error.floor is None else _number(error.floor.value)
+    return None if error.floor is None else _plain(error.floor.value)
 
 
 def _comparison_document(error: Comparison) -> dict[str, Any]:
     return {
-        "before": _number(error.before.value),
-        "before_interval": _interval(error.before.interval),
-        "after": _number(error.after.value),
-        "after_interval": _interval(error.after.interval),
+        **_with_interval("before", error.before),
+        **_with_interval("after", error.after),
         "noise_floor": camera_noise_floor(error),
         "unit": error.unit,
         "frames": int(np.isfinite(error.before.frames).sum()),

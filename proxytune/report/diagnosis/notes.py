@@ -49,17 +49,13 @@ def motion_notes(diagnosis: Diagnosis) -> list[str]:
         lines.append(f"beware: positions after {', '.join(worse)} are predicted worse than before; check the heading")
     if diagnosis.multistep is not None:
         ratios = ", ".join(f"{h:g} s: {one.value:.2f}" for h, one in diagnosis.multistep.ratios.items())
-        lines.append(
-            f"parameters were fitted to windows of {diagnosis.multistep.horizon_s:g} s instead of single steps; ratio "
-            f"of the errors on blocks left out: {ratios}"
-        )
+        fitted = f"parameters were fitted to windows of {diagnosis.multistep.horizon_s:g} s instead of single steps"
+        lines.append(f"{fitted}; ratio of the errors on blocks left out: {ratios}")
     if diagnosis.residual_depends_on:
         lines.append(f"no named effect explains the rest, which depends on: {', '.join(diagnosis.residual_depends_on)}")
     if diagnosis.period is not None:
-        lines.append(
-            f"the robot falls behind {diagnosis.period}; a new drive does not tell when, so no model has it: look for "
-            "what cuts the motors' power, or holds up their commands, so often"
-        )
+        behind = f"the robot falls behind {diagnosis.period}; a new drive does not tell when, so no model has it"
+        lines.append(f"{behind}: look for what cuts the motors' power, or holds up their commands, so often")
     lines += learnt_notes(diagnosis.learning)
     if diagnosis.could_not_be_seen:
         lines.append(f"these drives could not have shown: {', '.join(diagnosis.could_not_be_seen)}")
@@ -73,10 +69,9 @@ def moves_from(diagnosis: Diagnosis) -> list[str]:
     if inertia is None or friction is None or not inertia.value * friction.value > 0.0 or "dead_band" in theta:
         return []
     least = inertia.value * friction.value / diagnosis.robot.figures["full_speed"]
-    return [
-        f"with this rolling a throttle up to {least:.2g} moves nothing: a dead band of as much looks nearly the same; "
-        "to tell them apart, drive fast, then let the car roll without throttle"
-    ]
+    rests = f"with this rolling a throttle up to {least:.2g} moves nothing"
+    apart = "to tell them apart, drive fast, then let the car roll without throttle"
+    return [f"{rests}: a dead band of as much looks nearly the same; {apart}"]
 
 
 def per_cent(one: Ratio) -> tuple[float, tuple[float, float]]:
@@ -150,14 +145,11 @@ def clocks_notes(log: str, clocks: Sequence[Clocks], theta: Mapping[str, Any]) -
     notes = [f"clocks of {log}: {note}" for own in clocks for note in _say_clocks(own)]
     declared = next((own.declared_s for own in clocks), None)
     if declared is not None:
-        notes.append(
-            f"poses of {log} are stamped {declared:.3g} s later than commands, as it declares; that was taken out"
-        )
+        later = f"poses of {log} are stamped {declared:.3g} s later than commands, as it declares"
+        notes.append(f"{later}; that was taken out")
     elif "delay" in theta:
-        notes.append(
-            "delay and an offset between the clocks of commands and poses are one number: the delay is the "
-            "robot's only if one clock stamped both"
-        )
+        same = "delay and an offset between the clocks of commands and poses are one number"
+        notes.append(f"{same}: the delay is the robot's only if one clock stamped both")
     return notes
 
 
@@ -168,10 +160,9 @@ def _say_clocks(clocks: Clocks) -> Iterator[str]:
         side = "before its command, which no robot does" if latency.value < 0.0 else "after its command"
         lag = f"motion comes {abs(latency.value):.2f} s {side}"
         early = "early" if offset.value < 0.0 else "late"
-        yield (
-            f"{lag}; poses are stamped {abs(offset.value):.2f} s too {early} ({_ends_s(offset)}) if the robot's delay "
-            f"is {assumed:.2f} s; this was corrected. Stamp both with one clock, or move the poses yourself"
-        )
+        stamped = f"poses are stamped {abs(offset.value):.2f} s too {early} ({_ends_s(offset)})"
+        corrected = "this was corrected. Stamp both with one clock, or move the poses yourself"
+        yield f"{lag}; {stamped} if the robot's delay is {assumed:.2f} s; {corrected}"
     if clocks.drift.value:
         low, high = sorted(1e2 * abs(end) for end in clocks.drift.interval)
         yield (
@@ -180,16 +171,13 @@ def _say_clocks(clocks: Clocks) -> Iterator[str]:
             "Stamp both with one clock, or synchronise them"
         )
     for name, one in clocks.drives.items():
-        yield (
-            f"in drive {name} poses are stamped {abs(one.value):.2f} s {'earlier' if one.value < 0.0 else 'later'} "
-            f"({_ends_s(one)}) than in the others; this was corrected. Check how its clocks were set"
-        )
+        stamped = f"{abs(one.value):.2f} s {'earlier' if one.value < 0.0 else 'later'} ({_ends_s(one)})"
+        others = f"in drive {name} poses are stamped {stamped} than in the others"
+        yield f"{others}; this was corrected. Check how its clocks were set"
     for drive, time_s, by_s in clocks.jumps:
-        yield (
-            f"in drive {drive} the clock jumps at about {time_s:.0f} s: poses are stamped {abs(by_s):.2f} s "
-            f"{'earlier' if by_s < 0.0 else 'later'} from then on; only the longest stretch without a jump was used. "
-            "Keep clocks from being set during a drive"
-        )
+        stamped = f"poses are stamped {abs(by_s):.2f} s {'earlier' if by_s < 0.0 else 'later'} from then on"
+        used = "only the longest stretch without a jump was used. Keep clocks from being set during a drive"
+        yield f"in drive {drive} the clock jumps at about {time_s:.0f} s: {stamped}; {used}"
 
 
 def _ends_s(offset: Offset) -> str:
@@ -204,10 +192,9 @@ def unlike_notes(unlike: RobotClusters | None, names: Sequence[str]) -> list[str
         f"{gain:.2f} in {', '.join(names[number] for number in group)}"
         for gain, group in zip(unlike.gains, unlike.groups, strict=True)
     ]
-    return [
-        f"drives disagree: the {unlike.wheel} wheel's gain is {' but '.join(parts)}, as if of two robots, or of "
-        "one on two floors; no result here holds for both: diagnose each group alone, or find what changed"
-    ]
+    disagree = f"drives disagree: the {unlike.wheel} wheel's gain is {' but '.join(parts)}, as if of two robots"
+    both = "no result here holds for both: diagnose each group alone, or find what changed"
+    return [f"{disagree}, or of one on two floors; {both}"]
 
 
 LEAST_SHARE = 0.05
@@ -283,8 +270,6 @@ def learnt_notes(learning: Learning) -> list[str]:
         values = ", ".join(f"{name} {value:.3g}" for name, value in like.theta.items())
         notes.append(f"the curves look like {like.effect} ({values}), which alone keeps {percent(like.share)} of it")
     if learning.names_doubtful:
-        notes.append(
-            "beware: curves beside the declared model predict better than beside the named effects: the names are "
-            "likely wrong, and the model with curves is without them"
-        )
+        better = "beware: curves beside the declared model predict better than beside the named effects"
+        notes.append(f"{better}: the names are likely wrong, and the model with curves is without them")
     return notes

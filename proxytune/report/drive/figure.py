@@ -34,14 +34,11 @@ def episode_document(pair: SideBySide, study_seed: int) -> dict[str, Any]:
 def episode_text(pair: SideBySide, first: Sequence[str]) -> WholeWords:
     """A row for each metric, those that the study compares first."""
     names = [*first, *(name for name in pair.proxy.metrics if name not in first)]
-    rows = tuple(
-        (
-            with_unit(name, pair.units[name]),
-            *(short(side.metrics[name]) if name in side.metrics else "" for side in pair.sides.values()),
-        )
-        for name in names
-    )
-    return table_text(Table("", columns_of(("metric",), list(pair.sides)), rows))
+    rows = []
+    for name in names:
+        scores = (short(side.metrics[name]) if name in side.metrics else "" for side in pair.sides.values())
+        rows.append((with_unit(name, pair.units[name]), *scores))
+    return table_text(Table("", columns_of(("metric",), list(pair.sides)), tuple(rows)))
 
 
 def say_parting(pair: SideBySide) -> str:
@@ -200,11 +197,8 @@ def draw_paths(axes: Axes, pair: SideBySide) -> None:
     for side, end in ends.items():
         axes.plot(*end, "s", color=COLOURS[side], markersize=4.5, **edge)
     together = len(ends) > 1 and np.ptp(list(ends.values()), axis=0).max() < APART_M
-    marks |= (
-        {"both end": ("black", ends["proxy"])}
-        if together
-        else {f"{side} ends": (COLOURS[side], end) for side, end in ends.items()}
-    )
+    apart = {f"{side} ends": (COLOURS[side], end) for side, end in ends.items()}
+    marks |= {"both end": ("black", ends["proxy"])} if together else apart
     paths = np.concatenate([episode.places[::EVERY] for episode in pair.sides.values()])
     low, high = np.transpose([axes.get_xlim(), axes.get_ylim()])
     corners = corners_of(np.array([place for _, place in marks.values()]), paths, low, high)

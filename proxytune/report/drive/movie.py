@@ -198,11 +198,7 @@ def _count_frames(animation: Animation, watcher: Watcher) -> Iterator[Frame]:
 
 
 def write_gif(path: Path, frames: Iterable[Frame], samples: Sequence[Frame], frame_hz: float) -> None:
-    """Write a GIF of frames (rows, columns, 3) that plays for ever; its palette is made from the samples.
-
-    Raises:
-        RunError: If it cannot be written.
-    """
+    """Write a GIF of frames (rows, columns, 3) that plays for ever; its palette is made from the samples."""
     # Without k-means the white of the ground turns grey where pictures have many colours
     palette = Image.fromarray(np.concatenate(list(samples))).quantize(PALETTE_SIZE, kmeans=2, dither=Image.Dither.NONE)
     pictures = (Image.fromarray(frame).quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames)
@@ -212,11 +208,7 @@ def write_gif(path: Path, frames: Iterable[Frame], samples: Sequence[Frame], fra
 
 
 def find_ffmpeg() -> str:
-    """The program that writes an MP4: the one that is installed, or that of the package imageio-ffmpeg.
-
-    Raises:
-        InputError: If there is none.
-    """
+    """The program that writes an MP4, installed or of the package imageio-ffmpeg; refused if there is none."""
     found = shutil.which(str(matplotlib.rcParams["animation.ffmpeg_path"]))
     if found:
         return found
@@ -227,12 +219,7 @@ def find_ffmpeg() -> str:
 
 
 def write_mp4(path: Path, frames: Iterable[Frame], frame_hz: float) -> None:
-    """Write an MP4 of frames (rows, columns, 3), whose numbers of rows and columns are even.
-
-    Raises:
-        InputError: If ffmpeg is missing.
-        RunError: If it cannot be written.
-    """
+    """Write an MP4 of frames (rows, columns, 3), whose numbers of rows and columns are even; refused without ffmpeg."""
     with matplotlib.rc_context({"animation.ffmpeg_path": find_ffmpeg()}), _quiet():
         try:
             write_whole(path, "the animation ", lambda draft: _encode(draft, iter(frames), frame_hz))

@@ -279,12 +279,12 @@ def test_every_error_of_the_tape_has_a_place_of_its_own(stretches):
 def test_a_tracker_and_a_map_are_never_trusted_beyond_their_least():
     """Another scatter leaves all else alone."""
     before = stood(count=1)
-    views = before.with_scatter(0.0, 0.0)
+    views = replace(before, position_m=0.0, heading_rad=0.0)
     assert views.edges is before.edges
     assert (views.count, len(views.tape_scatter)) == (1, Tape(views.markings.stretches).size)
     np.testing.assert_allclose(views.pose_scatter, (gathering.LEAST_SCATTER[0], *gathering.LEAST_SCATTER))
     assert (views.tape_scatter >= gathering.LEAST_TAPE_M).all()
-    np.testing.assert_allclose(views.with_scatter(0.01, 0.02).pose_scatter, (0.01, 0.01, 0.02))
+    np.testing.assert_allclose(replace(views, position_m=0.01, heading_rad=0.02).pose_scatter, (0.01, 0.01, 0.02))
 
 
 COUNT = 24

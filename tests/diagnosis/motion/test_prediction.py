@@ -329,10 +329,9 @@ def test_errors_are_the_same_however_few_episodes_are_replayed_at_a_time(long, m
     monkeypatch.setattr(windows_module, "AT_ONCE", gone.duties.shape[1])
     assert np.array_equal(pose_errors(gone, theta, every_other), whole)
 
-    sizes, replay = [], windows_module.window_paths
-    monkeypatch.setattr(
-        windows_module, "window_paths", lambda some, *rest: sizes.append(len(some.duties)) or replay(some, *rest)
-    )
+    sizes, made = [], windows_module.innovations
+    replay = made.window_paths
+    monkeypatch.setattr(made, "window_paths", lambda some, *rest: sizes.append(len(some.duties)) or replay(some, *rest))
     monkeypatch.setattr(windows_module, "AT_ONCE", 2 * long.duties.shape[1])
     pose_errors(long, TRUTH, cut(long, 2.0))
     assert sizes == [2, 2, 2]

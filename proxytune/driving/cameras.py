@@ -97,19 +97,12 @@ def _tabulate(figures: CameraFigures, floor: Floor) -> tuple[int, TexelTable]:
 
 @dataclass(frozen=True)
 class _Copies:
-    """Copies of a floor's picture, each blurred over twice the width of the one before, in one row of texels.
+    """Copies of a floor's picture, each blurred over twice the width of the one before, in one row of texels."""
 
-    Attributes:
-        texels: Red, green, blue and a spare byte in one number each; the last is the sky.
-        firsts: Index of each copy's first texel.
-        sides: Texels along a side of each copy.
-        per_metre: Texels per metre of each copy.
-    """
-
-    texels: NDArray[np.uint32]
-    firsts: NDArray[np.int64]
-    sides: NDArray[np.int64]
-    per_metre: NDArray[np.float64]
+    texels: NDArray[np.uint32]  # red, green, blue and a spare byte in one number each; the last is the sky
+    firsts: NDArray[np.int64]  # index of each copy's first texel
+    sides: NDArray[np.int64]  # texels along a side of each copy
+    per_metre: NDArray[np.float64]  # texels per metre of each copy
 
 
 OCTAVES = 6

@@ -69,11 +69,9 @@ class Driver(Protocol):
 
     def begin(self, robot: Robot, /) -> Any:
         """The memory before the first command."""
-        ...
 
     def act(self, seen: Any, memory: Any, /) -> tuple[Command, Any]:
         """The next command, and the memory for the one after it."""
-        ...
 
 
 class Drive(NamedTuple):

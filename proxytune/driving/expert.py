@@ -29,21 +29,13 @@ PUSHES = {"differential": np.array((-1.0, 1.0)), "ackermann": np.array((0.0, 1.0
 
 
 class LessonMemory(NamedTuple):
-    """Memory of what a lesson has shown so far.
+    """Memory of what a lesson has shown so far."""
 
-    Attributes:
-        robot: Whose nominal figures are known.
-        disturbance: What was added to the steering at the last step [duty].
-        pictures: One before every command.
-        commands: What the expert would do, undisturbed.
-        on_road: Whether the middle of its axle was on the road then, whichever lane.
-    """
-
-    robot: Robot
-    disturbance: float
-    pictures: tuple[Picture, ...]
-    commands: tuple[Command, ...]
-    on_road: tuple[bool, ...]
+    robot: Robot  # whose nominal figures are known
+    disturbance: float  # what was added to the steering at the last step [duty]
+    pictures: tuple[Picture, ...]  # one before every command
+    commands: tuple[Command, ...]  # what the expert would do, undisturbed
+    on_road: tuple[bool, ...]  # whether the middle of its axle was on the road then, whichever lane
 
     @property
     def samples(self) -> Demonstration:
@@ -136,15 +128,10 @@ class Played(NamedTuple):
 
 
 class Observation(NamedTuple):
-    """Poses and pictures that recorded commands lead to.
+    """Poses and pictures that recorded commands lead to."""
 
-    Attributes:
-        poses: Start, then the pose after every tick, (ticks + 1, 3): x [m], y [m], heading [rad].
-        pictures: The picture before every command, (steps, rows, columns, 3).
-    """
-
-    poses: NDArray[np.float64]
-    pictures: NDArray[np.uint8]
+    poses: NDArray[np.float64]  # start, then the pose after every tick, (ticks + 1, 3): x [m], y [m], heading [rad]
+    pictures: NDArray[np.uint8]  # the picture before every command, (steps, rows, columns, 3)
 
 
 @dataclass(frozen=True)

@@ -55,7 +55,6 @@ class Fleet(Protocol):
         Returns:
             Their poses after each tick (robots, time, 3), and whether each has hit something or fallen over.
         """
-        ...
 
 
 @dataclass(frozen=True)

@@ -25,23 +25,14 @@ RIDGE = 0.005
 
 
 class TexelTable(NamedTuple):
-    """For each of a camera's pixels, a point in the robot's frame and a square of texels that shows it.
+    """For each of a camera's pixels, a point in the robot's frame and a square of texels that shows it."""
 
-    Attributes:
-        plane: The point and 1, in texels a metre, (3, pixels): x ahead, y to the left, 1.
-        begin: The first column and row of the pixel's square, 0, (pixels,).
-        last: The last column and row of the pixel's square, (pixels,).
-        first: Index of the first texel of that square, (pixels,).
-        side: Texels along its side, (pixels,).
-        texels: All squares one after another, (texels,): red, green, blue and a spare byte in one number each.
-    """
-
-    plane: NDArray[np.float32]
-    begin: NDArray[np.float32]
-    last: NDArray[np.float32]
-    first: NDArray[np.int32]
-    side: NDArray[np.int32]
-    texels: NDArray[np.uint32]
+    plane: NDArray[np.float32]  # the point and 1, in texels a metre, (3, pixels): x ahead, y to the left, 1
+    begin: NDArray[np.float32]  # the first column and row of the pixel's square, 0, (pixels,)
+    last: NDArray[np.float32]  # the last column and row of the pixel's square, (pixels,)
+    first: NDArray[np.int32]  # index of the first texel of that square, (pixels,)
+    side: NDArray[np.int32]  # texels along its side, (pixels,)
+    texels: NDArray[np.uint32]  # all squares one after another: red, green, blue and a spare byte in one number each
 
     def without(self, pixels: int) -> "TexelTable":
         """The same but for the first pixels."""
@@ -94,21 +85,13 @@ def expose(table: TexelTable, places: Places, weights: NDArray[np.float32], plan
 
 
 class Eyes(NamedTuple):
-    """The parts of pictures that robots look at for markings, and what they take for one.
+    """The parts of pictures that robots look at for markings, and what they take for one."""
 
-    Attributes:
-        ahead: How far ahead of the axle the floor lies that the nominal camera sees there [m], (eyes, pixels).
-        left: How far to the left [m], (eyes, pixels).
-        eye: Which eye each robot has, (robots,).
-        yellow: More is the yellow line, (robots, pixels); 255 where it does not look.
-        white: More is the white line, (robots, pixels); 255 where it does not look.
-    """
-
-    ahead: Floats
-    left: Floats
-    eye: Whole
-    yellow: NDArray[np.uint8]
-    white: NDArray[np.uint8]
+    ahead: Floats  # how far ahead of the axle the floor lies that the nominal camera sees there [m], (eyes, pixels)
+    left: Floats  # how far to the left [m], (eyes, pixels)
+    eye: Whole  # which eye each robot has, (robots,)
+    yellow: NDArray[np.uint8]  # more is the yellow line, (robots, pixels); 255 where it does not look
+    white: NDArray[np.uint8]  # more is the white line, (robots, pixels); 255 where it does not look
 
 
 def find_lanes(eyes: Eyes, yellow: NDArray[np.uint8], bright: NDArray[np.uint8]) -> Floats:
@@ -149,11 +132,9 @@ class Loops(Protocol):
 
     def expose(self, table: TexelTable, places: Places, weights: NDArray[np.float32], planes: NDArray[Any]) -> None:
         """Write what robots see as the ends of planes (n, 3, pixels): means over their places (n · times, 6)."""
-        ...
 
     def find_lanes(self, eyes: Eyes, yellow: NDArray[np.uint8], bright: NDArray[np.uint8]) -> Floats:
         """Offset [m], slope and number of pixels of lines through the lane's centre, (robots, 3)."""
-        ...
 
 
 def fastest(pictures: int) -> Loops:

@@ -83,7 +83,6 @@ class Renderer(Protocol):
 
     def render(self, poses: NDArray[np.floating[Any]]) -> NDArray[np.uint8]:
         """Render what it sees from poses (n, 3) of x [m], y [m], heading [rad]: (n, rows, columns, 3) RGB."""
-        ...
 
 
 def parted(pictures: NDArray[Any]) -> NDArray[Any]:

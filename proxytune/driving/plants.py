@@ -34,7 +34,6 @@ class Plant(Protocol):
             The poses after each tick, (time, 3): x [m], y [m] of the middle of the axle, heading [rad, unwrapped];
             and whether the robot has hit something or fallen over.
         """
-        ...
 
     def __enter__(self) -> Self: ...
 
@@ -123,21 +122,13 @@ ACROSS = 0.9
 
 @dataclass(frozen=True)
 class Wheel:
-    """A driven wheel.
+    """A driven wheel."""
 
-    Attributes:
-        joint: Name of its joint.
-        centre: Where it is in the root link's frame (3,) [m].
-        axis: Direction of its axle there (3,).
-        radius_m: Its radius [m]; None where its geometry is a mesh.
-        effort: The most that its motor gives [N m]; 0 where that is not said.
-    """
-
-    joint: str
-    centre: Floats
-    axis: Floats
-    radius_m: float | None
-    effort: float
+    joint: str  # name of its joint
+    centre: Floats  # where it is in the root link's frame (3,) [m]
+    axis: Floats  # direction of its axle there (3,)
+    radius_m: float | None  # its radius [m]; None where its geometry is a mesh
+    effort: float  # the most that its motor gives [N m]; 0 where that is not said
 
 
 @dataclass(frozen=True)

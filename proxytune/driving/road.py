@@ -73,24 +73,14 @@ def length(segments: tuple[Segment, ...]) -> float:
 
 @dataclass(frozen=True)
 class Paint:
-    """Markings of a road.
+    """Markings of a road."""
 
-    Attributes:
-        white_width: Width of the solid white edge lines [m].
-        yellow_width: Width of the dashed yellow centre line [m].
-        bend_radius: Radius of the yellow line in bends [m], which may be tighter than the road's; None where it is
-            not. The lanes as they are scored follow the road's own radius.
-        straight_dash: About how long a yellow dash on a straight is [m].
-        bend_dash: About how long one in a bend is [m].
-        tape_m: Standard deviation of where a line lies from where the map has it [m]; no episode depends on it.
-    """
-
-    white_width: float
-    yellow_width: float
-    bend_radius: float | None
-    straight_dash: float
-    bend_dash: float
-    tape_m: float = field(default=0.005, repr=False)
+    white_width: float  # width of the solid white edge lines [m]
+    yellow_width: float  # width of the dashed yellow centre line [m]
+    bend_radius: float | None  # of the yellow line in bends [m], tighter than the lanes as scored; None where it is not
+    straight_dash: float  # about how long a yellow dash on a straight is [m]
+    bend_dash: float  # about how long one in a bend is [m]
+    tape_m: float = field(default=0.005, repr=False)  # deviation of where lines lie [m]; no episode depends on it
 
 
 @dataclass(frozen=True)

@@ -33,17 +33,11 @@ DASH_PER_GAP = 2.0
 
 @dataclass(frozen=True, eq=False)
 class Floor:
-    """A floor seen from above.
+    """A floor seen from above."""
 
-    Attributes:
-        pixels: Shape (side, side, 3), uint8; rows go up with y, columns with x.
-        pixels_per_metre: Resolution.
-        origin: Where the corner of the first pixel lies, both in x and in y [m].
-    """
-
-    pixels: NDArray[np.uint8]
-    pixels_per_metre: float
-    origin: float
+    pixels: NDArray[np.uint8]  # shape (side, side, 3), uint8; rows go up with y, columns with x
+    pixels_per_metre: float  # resolution
+    origin: float  # where the corner of the first pixel lies, both in x and in y [m]
 
 
 @functools.lru_cache

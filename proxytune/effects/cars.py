@@ -137,19 +137,12 @@ FAR = 1e9
 
 
 class RollingState(NamedTuple):
-    """A car that rolls.
+    """A car that rolls."""
 
-    Attributes:
-        speed: At the end of the last sample (…,), as a fraction of full speed.
-        ahead: Whether its motor last drove it forwards (…,): 1, or −1.
-        sample_s: How long a sample lasts [s].
-        friction: What friction takes from it in a second.
-    """
-
-    speed: Signal
-    ahead: Signal
-    sample_s: float
-    friction: float
+    speed: Signal  # at the end of the last sample (…,), as a fraction of full speed
+    ahead: Signal  # whether its motor last drove it forwards (…,): 1, or −1
+    sample_s: float  # how long a sample lasts [s]
+    friction: float  # what friction takes from it in a second
 
 
 @effect("rolling", Stage.ACTUATION)

@@ -35,25 +35,15 @@ LONG_S = 1e6
 
 
 class Commands(NamedTuple):
-    """Duties and their past, wheel by wheel (…, time, 2) where nothing else is said.
+    """Duties and their past, wheel by wheel (…, time, 2) where nothing else is said."""
 
-    Attributes:
-        duty: The duties that reach the motors.
-        held: Since either of them last changed [s].
-        begun: Since each last was still, for more than a sample [s].
-        turned: Since each last took the other sign [s].
-        dragged: Each through plays of some widths (…, time, 2, widths).
-        slow: Low-passes of each (…, time, 2, time constants).
-        ramped: Each where its size grows and shrinks no faster than in such times (…, time, 2, pairs of times).
-    """
-
-    duty: Signal
-    held: Signal
-    begun: Signal
-    turned: Signal
-    dragged: Signal
-    slow: Signal
-    ramped: Signal
+    duty: Signal  # the duties that reach the motors
+    held: Signal  # since either of them last changed [s]
+    begun: Signal  # since each last was still, for more than a sample [s]
+    turned: Signal  # since each last took the other sign [s]
+    dragged: Signal  # each through plays of some widths (…, time, 2, widths)
+    slow: Signal  # low-passes of each (…, time, 2, time constants)
+    ramped: Signal  # each where its size grows and shrinks no faster than in such times (…, time, 2, pairs of times)
 
 
 class CommandState(NamedTuple):

@@ -228,11 +228,9 @@ class Effect(Protocol):
 
     def begin(self, context: FilterContext) -> Memory:
         """The memory before the first sample."""
-        ...
 
     def apply(self, signal: Signal, memory: Memory) -> tuple[Signal, Memory]:
         """Filter the next chunk, shape (…, time, channels), and give the memory for the one after."""
-        ...
 
 
 class ShippedEffect(Effect):
@@ -294,7 +292,6 @@ class Separate(Protocol):
 
     def skip(self, memory: Memory, samples: int, /) -> Memory:
         """The memory after so many more samples."""
-        ...
 
 
 def skip_nothing(effect: object, memory: Any, samples: int) -> Any:
@@ -308,7 +305,6 @@ class Recalling(Protocol):
 
     def recall(self, context: FilterContext, signal: Signal, row: Signal, sample: Signal) -> Memory:
         """The memory as of a sample (W,) of a row (W,) of longer signals (rows, time, channels)."""
-        ...
 
 
 FEW = 8
@@ -332,17 +328,11 @@ def _by_numba() -> ModuleType | None:
 
 
 class LowPassState(NamedTuple):
-    """A first-order low-pass under way.
+    """A first-order low-pass under way."""
 
-    Attributes:
-        value: What follows the signal, at the end of the last sample (…, channels).
-        remainder: How much of a step is left after one sample.
-        mean_remainder: How much of it is left on average over that sample.
-    """
-
-    value: Signal
-    remainder: float
-    mean_remainder: float
+    value: Signal  # what follows the signal, at the end of the last sample (…, channels)
+    remainder: float  # how much of a step is left after one sample
+    mean_remainder: float  # how much of it is left on average over that sample
 
 
 def low_pass_at(value: Signal, samples: float) -> LowPassState:

@@ -19,37 +19,21 @@ Knots = tuple[Knot, ...]
 
 
 class AskedMotion(NamedTuple):
-    """The motion asked for, held within what was seen, and its past, (…, time) where nothing else is said.
+    """The motion asked for, held within what was seen, and its past, (…, time) where nothing else is said."""
 
-    Attributes:
-        forward: Forward speed [m/s].
-        yaw: Yaw rate [rad/s].
-        wheels: Speeds of the left and the right wheel over the floor [m/s] (2, …, time).
-        seconds: Since the start [s].
-        use: Integral of the mean wheel speed's size, as a fraction of full speed, since the start [min].
-        heading: Heading [rad].
-        place: Place on the floor [m] (…, time, 2).
-        bands: Of each wheel's speed, the part between neighbouring low-passes [m/s] (2, …, time, time constants).
-        loads: Low-passes of the mean wheel speed's size, as a fraction of full speed (…, time, time constants).
-        rolled: How far each wheel, and the robot, has gone since it last turned the other way [m] (3, …, time).
-        started: Since each wheel last stood [s] (2, …, time).
-        rings: Damped swings, complex, that each change of a wheel's speed sets off [m/s] (2, …, time, frequencies).
-        played: Each wheel's speed through plays of some widths [m/s] (2, …, time, widths).
-    """
-
-    forward: Signal
-    yaw: Signal
-    wheels: Signal
-    seconds: Signal
-    use: Signal
-    heading: Signal
-    place: Signal
-    bands: Signal
-    loads: Signal
-    rolled: Signal
-    started: Signal
-    rings: Signal
-    played: Signal
+    forward: Signal  # forward speed [m/s]
+    yaw: Signal  # yaw rate [rad/s]
+    wheels: Signal  # speeds of the left and the right wheel over the floor [m/s] (2, …, time)
+    seconds: Signal  # since the start [s]
+    use: Signal  # integral of the mean wheel speed's size, as a fraction of full speed, since the start [min]
+    heading: Signal  # heading [rad]
+    place: Signal  # place on the floor [m] (…, time, 2)
+    bands: Signal  # of each wheel's speed, the part between neighbouring low-passes [m/s] (2, …, time, time constants)
+    loads: Signal  # low-passes of the mean wheel speed's size, as a fraction of full speed (…, time, time constants)
+    rolled: Signal  # how far each wheel, and the robot, has gone since it last turned the other way [m] (3, …, time)
+    started: Signal  # since each wheel last stood [s] (2, …, time)
+    rings: Signal  # damped complex swings that each change of a wheel's speed sets off [m/s] (2, …, time, frequencies)
+    played: Signal  # each wheel's speed through plays of some widths [m/s] (2, …, time, widths)
 
 
 WIDEST_MESH_M = 2.0
@@ -188,19 +172,12 @@ class LearntCurve(NamedTuple):
 
 
 class Group(NamedTuple):
-    """Curves over one signal.
+    """Curves over one signal."""
 
-    Attributes:
-        title: What people call the signal.
-        unit: The unit of the knots.
-        channels: What the curves add, by name.
-        low: The lowest knot that makes sense, or None where knots may be negative.
-    """
-
-    title: str
-    unit: str
-    channels: Mapping[str, Channel]
-    low: float | None = None
+    title: str  # what people call the signal
+    unit: str  # the unit of the knots
+    channels: Mapping[str, Channel]  # what the curves add, by name
+    low: float | None = None  # the lowest knot that makes sense, or None where knots may be negative
 
 
 def _of_wheels(unit: str, basis: Callable[[AskedMotion, Knots, int], Signal], ending: str = "") -> dict[str, Channel]:

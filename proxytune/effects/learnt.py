@@ -42,40 +42,22 @@ class FittedRange(NamedTuple):
 
 
 class LearntState(NamedTuple):
-    """State of all that has been so far: arrays of the batch's shape, and low-passes with their time constants last.
+    """State of all that has been so far: arrays of the batch's shape, and low-passes with their time constants last."""
 
-    Attributes:
-        seconds: Since the start [s].
-        use: Minutes at full speed.
-        slow: Low-passes of each wheel's speed (2, …, time constants).
-        load: Low-passes of the mean wheel speed's size (…, time constants).
-        rolled: How far each wheel, and the robot, has gone since it last turned the other way [m] (3, …), negative
-            backwards.
-        started: Since each wheel last stood [s] (2, …).
-        last: Each wheel's newest speed (2, …).
-        ring: Swings of each wheel's speed, complex (2, …, frequencies).
-        dragged: Each wheel's speed through plays (2, …, widths).
-        bearing: The heading, and headings that are known beforehand.
-        spot: The pose, and poses that are known beforehand.
-        rate_hz: Samples per second.
-        baseline: The robot's effective baseline [m].
-        full_speed: The robot's full speed [m/s].
-    """
-
-    seconds: Signal
-    use: Signal
-    slow: Signal
-    load: Signal
-    rolled: Signal
-    started: Signal
-    last: Signal
-    ring: Signal
-    dragged: Signal
-    bearing: DeadReckoning
-    spot: PoseReckoning
-    rate_hz: float
-    baseline: float
-    full_speed: float
+    seconds: Signal  # since the start [s]
+    use: Signal  # minutes at full speed
+    slow: Signal  # low-passes of each wheel's speed (2, …, time constants)
+    load: Signal  # low-passes of the mean wheel speed's size (…, time constants)
+    rolled: Signal  # way of each wheel and the robot since it last turned the other way [m] (3, …), negative backwards
+    started: Signal  # since each wheel last stood [s] (2, …)
+    last: Signal  # each wheel's newest speed (2, …)
+    ring: Signal  # swings of each wheel's speed, complex (2, …, frequencies)
+    dragged: Signal  # each wheel's speed through plays (2, …, widths)
+    bearing: DeadReckoning  # the heading, and headings that are known beforehand
+    spot: PoseReckoning  # the pose, and poses that are known beforehand
+    rate_hz: float  # samples per second
+    baseline: float  # the robot's effective baseline [m]
+    full_speed: float  # the robot's full speed [m/s]
 
 
 def track_of(nominal: Mapping[str, float]) -> float:

@@ -35,7 +35,6 @@ class Predictor(Protocol):
 
     def predict(self, observation: Any, *, deterministic: bool) -> Any:
         """The action for an observation, or the action and a state, which it is given back as `state=`."""
-        ...
 
 
 def ask_policy(policy: Predictor, observation: Any, state: Any, *, deterministic: bool = True) -> tuple[Any, Any]:
@@ -47,15 +46,10 @@ def ask_policy(policy: Predictor, observation: Any, state: Any, *, deterministic
 
 @dataclass(frozen=True)
 class PolicyAgent:
-    """Does what a policy says to each picture.
+    """Does what a policy says to each picture."""
 
-    Attributes:
-        policy: Trained on pictures as the environment shows them, (rows, columns, 3).
-        deterministic: Whether it takes its likeliest action; one that draws would make episodes differ at one seed.
-    """
-
-    policy: Predictor
-    deterministic: bool = True
+    policy: Predictor  # trained on pictures as the environment shows them, (rows, columns, 3)
+    deterministic: bool = True  # takes its likeliest action; one that draws makes episodes differ at one seed
 
     def begin(self, robot: Robot) -> None:
         """No state yet."""
@@ -239,18 +233,12 @@ class GymnasiumFamily:
 
     A start is a state to begin from, the same in every instance and under every seed of a study; the episode's seed is
     for what the environment draws later, for effects, and for the agent "random".
-
-    Attributes:
-        settings: The [domain] table.
-        spaces: What the environment is.
-        held: Values that every instance has, sorted by name in θ.
-        policies: Agents that are at hand, by name; its identity says nothing of them.
     """
 
-    settings: EnvironmentSettings
-    spaces: Spaces
-    held: tuple[tuple[str, float], ...]
-    policies: Mapping[str, Any] = field(default_factory=dict)
+    settings: EnvironmentSettings  # the [domain] table
+    spaces: Spaces  # what the environment is
+    held: tuple[tuple[str, float], ...]  # values that every instance has, sorted by name in θ
+    policies: Mapping[str, Any] = field(default_factory=dict)  # agents at hand, by name; no part of the identity
 
     @property
     def identity(self) -> str:

@@ -36,29 +36,17 @@ PICTURE = "uint8 pictures of shape (rows, columns, 3)"
 
 @dataclass(frozen=True)
 class Spaces:
-    """Facts about an environment; a text says why something is not to be had.
+    """Facts about an environment; a text says why something is not to be had."""
 
-    Attributes:
-        low: Smallest actions.
-        high: Largest actions; as many as there are actions.
-        no_actions: Why there are no Box actions that effects could bend, or empty.
-        picture: Rows and columns of the observed picture, or None.
-        no_picture: Why there is none, or empty.
-        no_state: Why no entries of the observation are known to be x, y and heading, or empty.
-        rate_hz: Steps per second; None where nobody says.
-        steps: Longest episode.
-        packages: Versions of what simulates, by package.
-    """
-
-    low: tuple[float, ...]
-    high: tuple[float, ...]
-    no_actions: str
-    picture: tuple[int, int] | None
-    no_picture: str
-    no_state: str
-    rate_hz: float | None
-    steps: int
-    packages: tuple[tuple[str, str], ...]
+    low: tuple[float, ...]  # smallest actions
+    high: tuple[float, ...]  # largest actions; as many as there are actions
+    no_actions: str  # why there are no Box actions that effects could bend, or empty
+    picture: tuple[int, int] | None  # rows and columns of the observed picture, or None
+    no_picture: str  # why there is none, or empty
+    no_state: str  # why no entries of the observation are known to be x, y and heading, or empty
+    rate_hz: float | None  # steps per second; None where nobody says
+    steps: int  # longest episode
+    packages: tuple[tuple[str, str], ...]  # versions of what simulates, by package
 
 
 def look_at(settings: EnvironmentSettings) -> Spaces:
@@ -230,18 +218,13 @@ TIMES = {"s", "min", "Hz"}
 class EnvironmentParameters(Mapping[str, Parameter]):
     """Parameters by their names in θ; a user's own effects answer where they are asked for by name.
 
-    Attributes:
-        own: Of the environment.
-        catalogue: The effects that there are.
-        spaces: What they would wrap.
-
     Raises:
         ExtensionError: If an effect that is asked for cannot wrap the environment, with the reason.
     """
 
-    own: tuple[OwnParameter, ...]
-    catalogue: Catalogue
-    spaces: Spaces
+    own: tuple[OwnParameter, ...]  # of the environment
+    catalogue: Catalogue  # the effects that there are
+    spaces: Spaces  # what they would wrap
 
     def __getitem__(self, name: str) -> Parameter:
         for one in self.own:

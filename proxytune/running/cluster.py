@@ -68,21 +68,13 @@ def on_cluster(address: str, say: Callable[[str], None] = _say) -> Iterator[None
 
 @dataclass
 class _Worker:
-    """A worker as the scheduler last told of it.
+    """A worker as the scheduler last told of it."""
 
-    Attributes:
-        address: Where it is.
-        told: When the scheduler last heard of it, by the scheduler's clock.
-        heard: When that was last seen to change, by ours [s].
-        unfit: Why it is not used; empty if it is.
-        running: Whether it takes work.
-    """
-
-    address: str
-    told: float
-    heard: float
-    unfit: str
-    running: bool
+    address: str  # where it is
+    told: float  # when the scheduler last heard of it, by the scheduler's clock
+    heard: float  # when that was last seen to change, by ours [s]
+    unfit: str  # why it is not used; empty if it is
+    running: bool  # whether it takes work
 
 
 @dataclass

@@ -26,23 +26,18 @@ class Watcher(Protocol):
 
     def begin(self, what: str, known: int) -> None:
         """Something of several episodes begins, so many of which are known already."""
-        ...
 
     def episode(self) -> None:
         """One more episode has been run."""
-        ...
 
     def best(self, score: float) -> None:
         """The lowest score so far."""
-        ...
 
     def finished(self, what: str) -> None:
         """A trial, a point or a run is finished; what became of it, in one line."""
-        ...
 
     def waiting(self, episode: str, seconds: float) -> None:
         """An episode that nothing ends has been under way for so long, and still is; told by another thread."""
-        ...
 
 
 class Silent:

@@ -94,13 +94,11 @@ class Place(Protocol):
 
     def cores(self) -> int:
         """The number of pieces that are done at once there, asked whenever there are pieces to do."""
-        ...
 
     def results(
         self, recipe: Recipe, numbered: Iterator[tuple[int, Any]], timeout_s: float | None
     ) -> Generator[tuple[int, Any], None, None]:
         """Do numbered pieces, each asked for when it can begin; LOST stands for the result of one that is given up."""
-        ...
 
 
 _elsewhere: ContextVar[Place | None] = ContextVar("elsewhere", default=None)

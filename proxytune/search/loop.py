@@ -50,7 +50,6 @@ class Proposer(Protocol):
 
     def propose(self, space: Space, trials: Sequence[Trial], seed: int) -> Values:
         """The next point; the same for the same trials in the order in which they were made, pending ones last."""
-        ...
 
 
 def batch_at(index: int, size: int, initial: int) -> range:
@@ -96,15 +95,12 @@ class Evaluator(Protocol):
 
     def trials(self) -> Sequence[Trial]:
         """The finished trials, in order."""
-        ...
 
     def ended(self) -> str:
         """The reason why the search goes no further, in one phrase; empty while it does."""
-        ...
 
     def evaluate(self, batch: range, propose: BatchPoints) -> None:
         """Score what is left of a batch of trials, counted from 0; `propose` gives the points of all of it."""
-        ...
 
 
 @dataclass(frozen=True)

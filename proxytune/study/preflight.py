@@ -52,25 +52,15 @@ LOOKS = 2
 
 @dataclass(frozen=True)
 class Movement:
-    """The effect on the metrics of moving one parameter across its box.
+    """The effect on the metrics of moving one parameter across its box."""
 
-    Attributes:
-        interval: The parameter and its box.
-        p_value: How likely noise alone is to change a metric as much, corrected for all tests; the lowest of them.
-        metric: The metric of that test.
-        change: Median over agents and starts of how much the parameter changes it.
-        noise: Median of how much noise does.
-        pairs: Over how many agents and starts; failed episodes are left out.
-        dead: Whether no metric of any of their episodes changed at all.
-    """
-
-    interval: Interval
-    p_value: float
-    metric: str
-    change: float
-    noise: float
-    pairs: int
-    dead: bool
+    interval: Interval  # the parameter and its box
+    p_value: float  # how likely noise alone is to change a metric as much, corrected for all tests; the lowest of them
+    metric: str  # the metric of that test
+    change: float  # median over agents and starts of how much the parameter changes it
+    noise: float  # median of how much noise does
+    pairs: int  # over how many agents and starts; failed episodes are left out
+    dead: bool  # whether no metric of any of their episodes changed at all
 
     @property
     def moves(self) -> bool:

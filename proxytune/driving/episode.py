@@ -35,33 +35,20 @@ TICK_HZ = 60
 
 @dataclass(frozen=True)
 class Instance:
-    """A domain instance S_θ, ready to drive.
+    """A domain instance S_θ, ready to drive."""
 
-    Attributes:
-        robot: Whose figures the agents know.
-        drivetrain: Command, actuation and motion effects.
-        camera: Mounted as the camera effects have it.
-        image: The image effects.
-        measurement: The measurement effects.
-    """
-
-    robot: Robot
-    drivetrain: Drivetrain
-    camera: Renderer
-    image: Chain
-    measurement: Chain
+    robot: Robot  # whose figures the agents know
+    drivetrain: Drivetrain  # command, actuation and motion effects
+    camera: Renderer  # mounted as the camera effects have it
+    image: Chain  # the image effects
+    measurement: Chain  # the measurement effects
 
 
 class Sight(NamedTuple):
-    """Sight of an expert, who need not make do with the picture.
+    """Sight of an expert, who need not make do with the picture."""
 
-    Attributes:
-        picture: The newest picture.
-        pose: Where the robot truly is, (3,): x [m], y [m], heading [rad].
-    """
-
-    picture: Picture
-    pose: Signal
+    picture: Picture  # the newest picture
+    pose: Signal  # where the robot truly is, (3,): x [m], y [m], heading [rad]
 
 
 class Driver(Protocol):
@@ -75,19 +62,12 @@ class Driver(Protocol):
 
 
 class Drive(NamedTuple):
-    """Record of an episode.
+    """Record of an episode."""
 
-    Attributes:
-        poses: Start, then the pose after every tick, (ticks + 1, 3): x [m], y [m], heading [rad].
-        commands: What the agent issued, (control steps, 2).
-        crashed: Whether it ended by hitting something or falling over.
-        memory: What the driver remembered in the end.
-    """
-
-    poses: Signal
-    commands: Signal
-    crashed: bool
-    memory: Any
+    poses: Signal  # start, then the pose after every tick, (ticks + 1, 3): x [m], y [m], heading [rad]
+    commands: Signal  # what the agent issued, (control steps, 2)
+    crashed: bool  # whether it ended by hitting something or falling over
+    memory: Any  # what the driver remembered in the end
 
     def columns(self, robot: Robot) -> tuple[dict[str, Signal], dict[str, Signal]]:
         """Poses and commands of the robot as columns by name, each with its `time` [s]."""
@@ -102,19 +82,12 @@ class Drive(NamedTuple):
 
 @dataclass(frozen=True)
 class Course:
-    """Start and end of an episode.
+    """Start and end of an episode."""
 
-    Attributes:
-        start: Starting pose (3,): x [m], y [m], heading [rad].
-        seconds: When time is over [s].
-        seed: Seed of everything random in the effects.
-        ended: Whether a robot at x, y [m] has left the course.
-    """
-
-    start: Signal
-    seconds: float
-    seed: int
-    ended: Callable[[float, float], bool]
+    start: Signal  # starting pose (3,): x [m], y [m], heading [rad]
+    seconds: float  # when time is over [s]
+    seed: int  # seed of everything random in the effects
+    ended: Callable[[float, float], bool]  # whether a robot at x, y [m] has left the course
 
 
 def picture_only(picture: Picture, pose: Signal) -> Picture:

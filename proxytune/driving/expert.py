@@ -50,22 +50,14 @@ class Expert:
 
     Whoever imitates an expert that never errs has not seen what to do after its own first error, so the steering is
     disturbed while the command that is shown is the undisturbed one (Laskey et al. 2017, DART).
-
-    Attributes:
-        road: The map.
-        look_ahead_m: How far along the lane's centre line the pursued point lies [m].
-        speed: Forward speed [m/s].
-        gain: Steering relative to the arc through that point.
-        disturbance: Standard deviation of what is added to the steering [duty].
-        seed: Seed of the disturbance.
     """
 
-    road: Road
-    look_ahead_m: float
-    speed: float
-    gain: float
-    disturbance: float
-    seed: int
+    road: Road  # the map
+    look_ahead_m: float  # how far along the lane's centre line the pursued point lies [m]
+    speed: float  # forward speed [m/s]
+    gain: float  # steering relative to the arc through that point
+    disturbance: float  # standard deviation of what is added to the steering [duty]
+    seed: int  # seed of the disturbance
 
     def begin(self, robot: Robot) -> LessonMemory:
         """Nothing shown yet."""

@@ -20,36 +20,22 @@ SKY = (115, 209, 255)
 class CameraFigures:
     """Figures of how a camera is made and mounted.
 
-    Attributes:
-        columns: Width of a picture [pixel].
-        rows: Height of a picture [pixel].
-        forward_m: How far the lens is ahead of the axle [m].
-        pitch_deg: How far it looks down [deg].
-        roll_deg: How far it is tilted clockwise in the driver's view [deg].
-        yaw_deg: How far it looks to the left [deg].
-        height_m: Height of the lens above the floor [m].
-        field_of_view_deg: Vertical field of view of the lens without distortion [deg].
-        k1: Radial distortion, plumb-bob model; below zero is a barrel.
-        centre_right: How far right of the picture's middle the lens' axis meets it, as a share of the picture's height.
-        centre_down: How far below the middle it does, in the same way.
-        aspect: Horizontal focal length over the vertical one; above 1 things look wider than they are.
-
     Raises:
         SettingsError: If no camera can have these figures.
     """
 
-    columns: int
-    rows: int
-    forward_m: float
-    pitch_deg: float
-    roll_deg: float
-    yaw_deg: float
-    height_m: float
-    field_of_view_deg: float
-    k1: float
-    centre_right: float = 0.0
-    centre_down: float = 0.0
-    aspect: float = 1.0
+    columns: int  # width of a picture [pixel]
+    rows: int  # height of a picture [pixel]
+    forward_m: float  # how far the lens is ahead of the axle [m]
+    pitch_deg: float  # how far it looks down [deg]
+    roll_deg: float  # how far it is tilted clockwise in the driver's view [deg]
+    yaw_deg: float  # how far it looks to the left [deg]
+    height_m: float  # height of the lens above the floor [m]
+    field_of_view_deg: float  # vertical field of view of the lens without distortion [deg]
+    k1: float  # radial distortion, plumb-bob model; below zero is a barrel
+    centre_right: float = 0.0  # how far right of the picture's middle the lens' axis is, as a share of its height
+    centre_down: float = 0.0  # how far below the middle it does, in the same way
+    aspect: float = 1.0  # horizontal focal length over the vertical one; above 1 things look wider than they are
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():

@@ -133,19 +133,12 @@ class Wheel:
 
 @dataclass(frozen=True)
 class Body:
-    """A URDF's two driven wheels, its mass and its camera.
+    """A URDF's two driven wheels, its mass and its camera."""
 
-    Attributes:
-        left: The left wheel.
-        right: The right wheel.
-        mass_kg: Of all its links [kg].
-        camera: The pose of a link called camera in the root link's frame (4, 4); None where there is none.
-    """
-
-    left: Wheel
-    right: Wheel
-    mass_kg: float
-    camera: Floats | None
+    left: Wheel  # the left wheel
+    right: Wheel  # the right wheel
+    mass_kg: float  # of all its links [kg]
+    camera: Floats | None  # the pose of a link called camera in the root link's frame (4, 4); None where there is none
 
     @property
     def wheel_distance(self) -> float:

@@ -85,28 +85,15 @@ class Paint:
 
 @dataclass(frozen=True)
 class Road:
-    """A map with one closed road of two lanes, right-hand traffic, asphalt all over.
+    """A map with one closed road of two lanes, right-hand traffic, asphalt all over."""
 
-    Attributes:
-        name: What `[domain] map` calls it.
-        description: What it is, in one line.
-        size: Of the map along x and y [m]; its bottom-left corner is the origin.
-        begin: Where the first segment begins: x [m], y [m], heading [deg].
-        segments: The road's centre line, counter-clockwise round what it encloses.
-        width: Between the outer edges of the white lines [m].
-        lane_offset: Distance of a lane's centre line from the road's [m].
-        lane_width: Width of a lane [m].
-        paint: How it is marked.
-        starts: Starting poses (x [m], y [m], heading [deg]).
-    """
-
-    name: str
-    description: str
-    size: tuple[float, float]
-    begin: tuple[float, float, float]
-    segments: tuple[Segment, ...]
-    width: float
-    lane_offset: float
-    lane_width: float
-    paint: Paint
-    starts: tuple[tuple[float, float, float], ...]
+    name: str  # what `[domain] map` calls it
+    description: str  # what it is, in one line
+    size: tuple[float, float]  # of the map along x and y [m]; its bottom-left corner is the origin
+    begin: tuple[float, float, float]  # where the first segment begins: x [m], y [m], heading [deg]
+    segments: tuple[Segment, ...]  # the road's centre line, counter-clockwise round what it encloses
+    width: float  # between the outer edges of the white lines [m]
+    lane_offset: float  # distance of a lane's centre line from the road's [m]
+    lane_width: float  # width of a lane [m]
+    paint: Paint  # how it is marked
+    starts: tuple[tuple[float, float, float], ...]  # starting poses (x [m], y [m], heading [deg])

@@ -115,25 +115,14 @@ LINES = ("left white line", "right white line", "yellow line", "yellow dashes")
 
 
 class Marks(NamedTuple):
-    """The nearest marking to each of n places.
+    """The nearest marking to each of n places."""
 
-    Attributes:
-        distance: Signed distance from its edge, inside negative (n,) [m]; from a dash's end along the centre line, as
-            it is painted.
-        slope: Unit vector in which the distance grows (n, 2).
-        stretch: Which of the road's segments it is on (n,).
-        line: Which of LINES it is (n,); the ends of dashes are the last.
-        side: Whether the nearest edge moves away (1) or closer (−1) as the marking moves right, or on, seen by a robot
-            that drives counter-clockwise (n,).
-        share: How much of the stretch lies behind, from 0 to 1 (n,).
-    """
-
-    distance: Floats
-    slope: Floats
-    stretch: NDArray[np.intp]
-    line: NDArray[np.intp]
-    side: Floats
-    share: Floats
+    distance: Floats  # signed, from its edge, inside negative (n,) [m]; from a dash's end along the painted centre line
+    slope: Floats  # unit vector in which the distance grows (n, 2)
+    stretch: NDArray[np.intp]  # which of the road's segments it is on (n,)
+    line: NDArray[np.intp]  # which of LINES it is (n,); the ends of dashes are the last
+    side: Floats  # 1 where the nearest edge goes away as the marking moves right, or on, −1 where it comes (n,)
+    share: Floats  # how much of the stretch lies behind, from 0 to 1 (n,)
 
 
 class Markings:

@@ -242,16 +242,11 @@ class Catalogue:
 
     A user's own is called `module:Attribute`, and its parameters in θ `module:Attribute` where it has one, else
     `module:Attribute.parameter`. Whatever is not shipped comes after the shipped effects of its stage, by name.
-
-    Attributes:
-        folder: Whose modules come before the installed ones; None for the installed ones alone.
-        own: Effects that a diagnosis is to try beside the shipped ones and plug-ins.
-        drive: How the robot drives, one of DRIVES: which effects are shipped for it.
     """
 
-    folder: Path | None = None
-    own: tuple[str, ...] = ()
-    drive: str = "differential"
+    folder: Path | None = None  # whose modules come before the installed ones; None for the installed ones alone
+    own: tuple[str, ...] = ()  # effects that a diagnosis is to try beside the shipped ones and plug-ins
+    drive: str = "differential"  # how the robot drives, one of DRIVES: which effects are shipped for it
 
     @property
     def shipped(self) -> Mapping[str, type[Effect]]:

@@ -80,17 +80,11 @@ class WheelCurve(StrEnum):
 
 
 class Lateness(NamedTuple):
-    """Lateness of commands under a random effect: its mean [s], and a mixture of times about it.
+    """Lateness of commands under a random effect: its mean [s], and a mixture of times about it."""
 
-    Attributes:
-        mean_s: How late a command is on average [s].
-        commands: Times that a command may be later than that (K,), in commands.
-        log_weights: Logarithms of how often each happens (K,).
-    """
-
-    mean_s: float
-    commands: NDArray[Any]
-    log_weights: NDArray[Any]
+    mean_s: float  # how late a command is on average [s]
+    commands: NDArray[Any]  # times that a command may be later than that (K,), in commands
+    log_weights: NDArray[Any]  # logarithms of how often each happens (K,)
 
 
 @dataclass(frozen=True)

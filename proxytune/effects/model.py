@@ -19,20 +19,13 @@ from proxytune.space import Parameter
 
 @dataclass(frozen=True)
 class Model:
-    """Content of a model.toml.
+    """Content of a model.toml."""
 
-    Attributes:
-        robot: Name of the robot.
-        plant: Name of the plant, or None where the reader chooses.
-        theta: Values of the effects' parameters by their names in θ.
-        intervals: The interval of each value that has one.
-        geometry: Figures of a robot without a folder: wheel_radius, effective_baseline [m], full_speed [m/s].
-    """
-
-    robot: str
-    plant: str | None
-    theta: Mapping[str, float]
-    intervals: Mapping[str, tuple[float, float]]
+    robot: str  # name of the robot
+    plant: str | None  # name of the plant, or None where the reader chooses
+    theta: Mapping[str, float]  # values of the effects' parameters by their names in θ
+    intervals: Mapping[str, tuple[float, float]]  # the interval of each value that has one
+    # figures of a robot without a folder: wheel_radius, effective_baseline [m], full_speed [m/s]
     geometry: Mapping[str, float] = field(default_factory=dict)
 
     @property

@@ -91,11 +91,6 @@ class _Held:
     since: float
     left_behind: bool = False
 
-    @property
-    def pending(self) -> bool:
-        """Whether nothing has become of it yet, as far as is known."""
-        return not self.result.done()
-
 
 class _Pieces:
     """The pieces to do, in their order; those that come back are handed out first."""
@@ -161,9 +156,7 @@ class _Patience:
 def _wait_for_scheduler(address: str) -> None:
     """Wait until what listens there greets as a scheduler does: Dask's own client waits without end for what is none.
 
-    Raises:
-        OSError: If nothing does within CONNECT_S.
-        ValueError: If the address is none.
+    Raises OSError if nothing does within CONNECT_S, ValueError if the address is none.
     """
     scheme, _, place = address.rpartition("://")
     if scheme not in ("", "tcp"):
@@ -318,11 +311,12 @@ class Cluster:
                 self._woken.wait(POLL_S)
                 self._woken.clear()
                 for key, one in list(held.items()):
-                    came = self._under_way(key, one, pieces, timeout_s) if one.pending else self._ended(key, one)
+                    over = one.result.done()
+                    came = self._ended(key, one) if over else self._under_way(key, one, pieces, timeout_s)
                     if came is _UNDER_WAY:
                         continue
                     # A worker that was left behind is not free before it has ended what it has.
-                    if not (one.left_behind and one.pending and key in self._workers):
+                    if one.result.done() or not (one.left_behind and key in self._workers):
                         del held[key]
                     if came is not _AGAIN:
                         if pieces.done(one.number):

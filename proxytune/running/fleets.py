@@ -141,11 +141,7 @@ def _failure(problem: BaseException) -> str:
 
 @contextmanager
 def _seeded(seed: int) -> Iterator[Callable[[], bool]]:
-    """Let the generators of the whole process draw from a seed, and go on afterwards as if they had not.
-
-    Yields:
-        Tells whether anything has been drawn from them meanwhile.
-    """
+    """Let the process's generators draw from a seed, then go on as if they had not; gives what tells if any drew."""
     plain, array = random.getstate(), np.random.get_state()
     random.seed(seed)
     np.random.seed(seed % 2**32)

@@ -109,11 +109,8 @@ def end_with(parent: int, safe_path: str | None) -> None:
     """End this process, which a parent has just started, with that parent and not before.
 
     After a `kill -9` it would wait for work for minutes. Ctrl-C, and the end of a terminal, reach every process of that
-    terminal; the parent answers them, and ends this one. Of a crash the parent tells in one line.
-
-    Args:
-        parent: Its number.
-        safe_path: What SAFE_PATH is to be for processes that this one starts.
+    terminal; the parent answers them, and ends this one. Of a crash the parent tells in one line. SAFE_PATH is set for
+    processes that this one starts.
     """
     _set_safe_path(safe_path)
     sys.stdout, sys.stderr = (cast(TextIO, LastingStream(one)) for one in (sys.stdout, sys.stderr))

@@ -42,15 +42,10 @@ Result = TypeVar("Result")
 
 @dataclass(frozen=True)
 class WorkerExit:
-    """The end of a process before its piece had a result.
+    """The end of a process before its piece had a result."""
 
-    Attributes:
-        how: In one phrase, as "SIGSEGV" or "exit status 3"; empty if it was ended because the piece took too long.
-        seconds: How long the piece took until then.
-    """
-
-    how: str
-    seconds: float
+    how: str  # in one phrase, as "SIGSEGV" or "exit status 3"; empty if it was ended because the piece took too long
+    seconds: float  # how long the piece took until then
 
     @property
     def killed(self) -> bool:
@@ -64,22 +59,16 @@ class Rescue(Generic[Piece, Result]):
 
     A process that dies is not known to have died of its piece: each part of that is done once more by an isolated
     worker, and lost if that dies too.
-
-    Attributes:
-        lost: The result of a piece that has no other, from how its process ended.
-        timeout_s: How long a piece may take [s]; then all are done in other processes.
-        suspect: Whether a piece is done by an isolated worker at once, because the like of it has ended a process.
-        begins: Told of each piece that begins in this very process, which it may end.
-        isolated: Whether no piece is done in this process, as one may end it.
-        parts: What a piece is done again by, each part by itself.
     """
 
-    lost: Callable[[Piece, WorkerExit], Result]
-    timeout_s: float | None = None
+    lost: Callable[[Piece, WorkerExit], Result]  # the result of a piece that has no other, from how its process ended
+    timeout_s: float | None = None  # how long a piece may take [s]; then all are done in other processes
+    # whether a piece is done by an isolated worker at once, because the like of it has ended a process
     suspect: Callable[[Piece], bool] = lambda _: False
+    # told of each piece that begins in this very process, which it may end
     begins: Callable[[Piece], None] = lambda _: None
-    isolated: bool = False
-    parts: Callable[[Piece], Sequence[Piece]] = lambda piece: (piece,)
+    isolated: bool = False  # whether no piece is done in this process, as one may end it
+    parts: Callable[[Piece], Sequence[Piece]] = lambda piece: (piece,)  # by what it is done again, each by itself
 
 
 LOST: Any = object()
@@ -311,15 +300,9 @@ class IsolatedWorker:
         self._end()
 
     def do(self, piece: Any, lost: Callable[[WorkerExit], Any], tries: int = 2) -> Any:
-        """Do a piece.
+        """Do a piece, unless the work cannot go to another process; `lost` gives the result if it ends its process.
 
-        Args:
-            piece: The piece.
-            lost: Its result where it ends its process, or takes longer than it may.
-            tries: How often it may take too long: the machine may have been at fault, or a process have been stopped.
-
-        Raises:
-            NotSendableError: If the work cannot go to another process.
+        Or if it takes too long in so many tries: the machine may have been at fault, or a process have been stopped.
         """
         if self._process is None:
             self._recipe = self._recipe or recipe_of(self._work)
@@ -372,15 +355,10 @@ _trace: ContextVar[Trace | None] = ContextVar("trace", default=None)
 
 @dataclass(frozen=True)
 class TracedTask:
-    """Work whose pieces keep what they are doing, for whoever asks after their process has ended.
+    """Work whose pieces keep what they are doing, for whoever asks after their process has ended."""
 
-    Attributes:
-        work: Does a piece, in a process that may be ended if a limit is set in it.
-        folder: Where the traces are; another machine need not have it.
-    """
-
-    work: Callable[[Any], Any]
-    folder: Path
+    work: Callable[[Any], Any]  # does a piece, in a process that may be ended if a limit is set in it
+    folder: Path  # where the traces are; another machine need not have it
 
     def __call__(self, piece: Any) -> Any:
         """Do a piece."""

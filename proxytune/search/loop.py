@@ -105,23 +105,14 @@ class Evaluator(Protocol):
 
 @dataclass(frozen=True)
 class Search:
-    """All that proposals are a function of, apart from the finished trials.
+    """All that proposals are a function of, apart from the finished trials."""
 
-    Attributes:
-        space: The box.
-        proposer: What proposes.
-        seed: Seed of all that is drawn.
-        budget: How many trials at most.
-        initial: How many of them come from the quasi-random design.
-        batch: How many are proposed together.
-    """
-
-    space: Space
-    proposer: Proposer
-    seed: int
-    budget: int
-    initial: int
-    batch: int = 1
+    space: Space  # the box
+    proposer: Proposer  # what proposes
+    seed: int  # seed of all that is drawn
+    budget: int  # how many trials at most
+    initial: int  # how many of them come from the quasi-random design
+    batch: int = 1  # how many are proposed together
 
     def run(self, evaluator: Evaluator) -> None:
         """Search from wherever the evaluator's trials were left.

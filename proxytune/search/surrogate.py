@@ -54,17 +54,11 @@ follows, so the surrogate never threads them exactly."""
 
 @dataclass(frozen=True)
 class Surrogate:
-    """The posterior of the score given the finished trials.
+    """The posterior of the score given the finished trials."""
 
-    Attributes:
-        space: The search box.
-        model: The fitted regressor, on the unit cube.
-        visited: The trials it was fitted to, in canonical order, without the failed ones.
-    """
-
-    space: Space
-    model: "GaussianProcessRegressor"
-    visited: tuple[Trial, ...]
+    space: Space  # the search box
+    model: "GaussianProcessRegressor"  # the fitted regressor, on the unit cube
+    visited: tuple[Trial, ...]  # the trials it was fitted to, in canonical order, without the failed ones
 
     @property
     def noise_deviation(self) -> float:

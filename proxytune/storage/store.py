@@ -75,21 +75,13 @@ class TrialRecord:
 
 @dataclass(frozen=True)
 class SweepRecord:
-    """A sweep that has been asked for.
+    """A sweep that has been asked for."""
 
-    Attributes:
-        parameter: What is swept.
-        base: Values of the others; those not named are nominal.
-        points: Where it is looked at, in rising order.
-        target_model: The target's model.toml as it was when POD was asked for; empty where it was not.
-        replays: Identity of the domain family whose episodes are POD's replays; empty without POD.
-    """
-
-    parameter: str
-    base: Theta
-    points: tuple[float, ...]
-    target_model: str = ""
-    replays: str = ""
+    parameter: str  # what is swept
+    base: Theta  # values of the others; those not named are nominal
+    points: tuple[float, ...]  # where it is looked at, in rising order
+    target_model: str = ""  # the target's model.toml as it was when POD was asked for; empty where it was not
+    replays: str = ""  # identity of the domain family whose episodes are POD's replays; empty without POD
 
 
 class Store:
@@ -221,7 +213,7 @@ class Store:
         return self._made(_episode, query, (identity,))
 
     def begin_episode(self, identity: str, *episodes: Episode) -> None:
-        """Keep which episodes run in this very process, in place of those before: they may end the process."""
+        """Keep which episodes, if any, run in this very process now, not those before: they may end the process."""
         with self._transaction() as connection:
             connection.execute("DELETE FROM under_way")
             database.seal(connection, "under_way")
@@ -229,12 +221,6 @@ class Store:
                 which = {"theta": json.dumps(dict(episode.theta)), "agent": episode.agent}
                 row = {"place": place, "identity": identity, "start": episode.start, "seed": episode.seed}
                 database.write_row(connection, "under_way", row | which)
-
-    def end_episodes(self) -> None:
-        """Keep that no episode is under way."""
-        with self._transaction() as connection:
-            connection.execute("DELETE FROM under_way")
-            database.seal(connection, "under_way")
 
     def agents_that_failed(self, *how: str) -> set[str]:
         """The agents with a failed episode, in any family, whose failure begins so."""

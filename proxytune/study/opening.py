@@ -186,30 +186,19 @@ PRPV = KEPT["prpv"]
 
 @dataclass(frozen=True)
 class Study:
-    """All that a trial is a function of, apart from θ.
+    """All that a trial is a function of, apart from θ."""
 
-    Attributes:
-        settings: What study.toml says.
-        family: The proxy's domain family.
-        target: The target's scores of the study's agents, in the study's order: the metrics by which they are compared,
-            then every other one that the family has too.
-        identity: What determines the result of an episode in the proxy, apart from the episode.
-        truth: The θ that made the target, where study.toml names a model of it; nothing depends on it.
-        cautions: What of study.toml or of the target's table is left out, in one line each.
-        objective: The measure that its trials make small or large.
-        engine: What proposes its trials after the design.
-        code: A digest of what the user's own code means; failures of other code are not remembered.
-    """
-
-    settings: StudySettings
-    family: DomainFamily
+    settings: StudySettings  # what study.toml says
+    family: DomainFamily  # the proxy's domain family
+    # the target's scores of the study's agents, in the study's order: the metrics by which they are compared, then
+    # every other one that the family has too
     target: ScoreTable
-    identity: str
-    truth: Theta | None = None
-    cautions: tuple[str, ...] = ()
-    objective: Objective = PRPV
-    engine: Engine = GAUSSIAN_PROCESS
-    code: str = ""
+    identity: str  # what determines the result of an episode in the proxy, apart from the episode
+    truth: Theta | None = None  # the θ that made the target, where study.toml names its model; no trial depends on it
+    cautions: tuple[str, ...] = ()  # what of study.toml or of the target's table is left out, in one line each
+    objective: Objective = PRPV  # the measure that its trials make small or large
+    engine: Engine = GAUSSIAN_PROCESS  # what proposes its trials after the design
+    code: str = ""  # a digest of what the user's own code means; failures of other code are not remembered
 
 
 def open_study(path: Path) -> Study:

@@ -34,25 +34,17 @@ from proxytune.usefulness import dominance
 
 @dataclass(frozen=True)
 class Evaluation:
-    """The usefulness of a domain instance.
+    """The usefulness of a domain instance."""
 
-    Attributes:
-        theta: The instance.
-        proxy: The agents' scores in it, over the episodes that worked; None if an agent has none.
-        measures: Every measure by name, the objective's among them; one that is undefined is None. Empty if an agent
-            has no episode that worked.
-        score: What the study makes small; None if there is none.
-        failures: The outcomes that failed.
-        failure: Why there is no score, empty if there is one.
-        disagreement: |α_proxy − α_target| of each pair of agents, in the order of their names, shape (agents, agents).
-    """
-
-    theta: Theta
-    proxy: ScoreTable | None
+    theta: Theta  # the instance
+    proxy: ScoreTable | None  # the agents' scores in it, over the episodes that worked; None if an agent has none
+    # every measure by name, the objective's among them; one that is undefined is None; empty if an agent has no episode
+    # that worked
     measures: Mapping[str, float | None]
-    score: float | None
-    failures: tuple[Outcome, ...]
-    failure: str = ""
+    score: float | None  # what the study makes small; None if there is none
+    failures: tuple[Outcome, ...]  # the outcomes that failed
+    failure: str = ""  # why there is no score, empty if there is one
+    # |α_proxy − α_target| of each pair of agents, in the order of their names, shape (agents, agents)
     disagreement: Floats | None = field(default=None, compare=False, repr=False)
 
     @property
@@ -300,7 +292,7 @@ class StudyRun:
             apart = kept_apart(store, self.settings, self.study.family, self.study.code, needed, watch)
             yield replace(watch, alone=apart | store.agents_that_failed(RAISED))
         finally:
-            store.end_episodes()
+            store.begin_episode(identity)
 
     def _keep(self, outcomes: Sequence[Outcome]) -> None:
         """Keep the outcomes of a fleet; what took too long for the first time is tried again by the next run."""

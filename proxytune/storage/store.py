@@ -29,33 +29,20 @@ Made = TypeVar("Made")
 
 @dataclass(frozen=True)
 class TrialRecord:
-    """One trial of a study.
+    """One trial of a study."""
 
-    Attributes:
-        number: Counted from 1.
-        theta: Where it was.
-        state: Whether it has been scored, has failed, was cut off, or is still open.
-        score: What the search makes small: the objective, with its sign turned if it is to be large; of a trial that
-            was cut off, what that is expected to be. None if it failed or is open.
-        measures: Every measure of it by name, the objective's among them; None where one is undefined. Empty unless
-            finished.
-        failed_episodes: How many of its episodes failed.
-        failure: Why it failed, empty if it did not.
-        decided: The agents that had been driven when it was cut off; empty if it was not.
-        bound: What its PRPV cannot be below, None unless it was cut off.
-        seconds: How long it took, where its episodes do not tell.
-    """
-
-    number: int
-    theta: Theta
-    state: State = "open"
+    number: int  # counted from 1
+    theta: Theta  # where it was
+    state: State = "open"  # whether it has been scored, has failed, was cut off, or is still open
+    # what the search makes small: the objective, with its sign turned if it is to be large; of a trial that was cut
+    # off, what that is expected to be; None if it failed or is open
     score: float | None = None
-    measures: Mapping[str, float | None] = field(default_factory=dict)
-    failed_episodes: int = 0
-    failure: str = ""
-    decided: tuple[str, ...] = ()
-    bound: float | None = None
-    seconds: float = 0.0
+    measures: Mapping[str, float | None] = field(default_factory=dict)  # by name, the objective's too; None: undefined
+    failed_episodes: int = 0  # how many of its episodes failed
+    failure: str = ""  # why it failed, empty if it did not
+    decided: tuple[str, ...] = ()  # the agents that had been driven when it was cut off; empty if it was not
+    bound: float | None = None  # what its PRPV cannot be below, None unless it was cut off
+    seconds: float = 0.0  # how long it took, where its episodes do not tell
 
     @property
     def prpv(self) -> float | None:

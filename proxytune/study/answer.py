@@ -107,21 +107,13 @@ class Finalist:
 
 @dataclass(frozen=True)
 class Confirmation:
-    """The answer of fresh episodes.
+    """The answer of fresh episodes."""
 
-    Attributes:
-        answer: The answer, its fresh episodes those of the repetitions that nothing was chosen by.
-        candidates: All finalists, the search's own favourite first.
-        episodes: How many fresh episodes each of these was driven in.
-        expected: What is expected of the answer; None if an agent failed in all its fresh episodes.
-        knowledge: What is known of θ, by trials and finalists together.
-    """
-
-    answer: Finalist
-    candidates: tuple[Finalist, ...]
-    episodes: int
-    expected: Expectation | None
-    knowledge: Knowledge
+    answer: Finalist  # the answer, its fresh episodes those of the repetitions that nothing was chosen by
+    candidates: tuple[Finalist, ...]  # all finalists, the search's own favourite first
+    episodes: int  # how many fresh episodes each of these was driven in
+    expected: Expectation | None  # what is expected of the answer; None if an agent failed in all its fresh episodes
+    knowledge: Knowledge  # what is known of θ, by trials and finalists together
 
     @property
     def repetitions(self) -> int:

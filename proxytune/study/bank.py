@@ -26,21 +26,13 @@ WITHIN = 1 / 30
 
 @dataclass(frozen=True)
 class Bank:
-    """A bank as it stands.
+    """A bank as it stands."""
 
-    Attributes:
-        settings: Of its study.
-        trials: How many trials it has.
-        expected: What a target measured from some first starts will tell, by their number.
-        needed: How many starts tell each parameter to `WITHIN`; None where more starts than there are would not.
-        units: The parameters' units by their names; "" where one has none.
-    """
-
-    settings: StudySettings
-    trials: int
-    expected: Mapping[int, Expected]
-    needed: Mapping[str, int | None]
-    units: Mapping[str, str]
+    settings: StudySettings  # of its study
+    trials: int  # how many trials it has
+    expected: Mapping[int, Expected]  # what a target measured from some first starts will tell, by their number
+    needed: Mapping[str, int | None]  # how many starts tell each parameter to `WITHIN`; None where all do not
+    units: Mapping[str, str]  # the parameters' units by their names; "" where one has none
 
     def widths(self, starts: int) -> dict[str, float]:
         """Mean width of each parameter's 95 % interval, by a target that is measured from so many starts."""

@@ -33,19 +33,12 @@ RESAMPLES = 1000
 
 @dataclass(frozen=True)
 class TunedFamily:
-    """A domain family at the best θ that was found in its time.
+    """A domain family at the best θ that was found in its time."""
 
-    Attributes:
-        name: What study.toml calls it.
-        result: What its study has found.
-        seconds: How long the episodes of its trials took, divided by the processes that ran them [s].
-        episode_seconds: How long each episode at its best θ took [s], in the order in which all families have them.
-    """
-
-    name: str
-    result: StudyResult
-    seconds: float
-    episode_seconds: tuple[float, ...]
+    name: str  # what study.toml calls it
+    result: StudyResult  # what its study has found
+    seconds: float  # how long the episodes of its trials took, divided by the processes that ran them [s]
+    episode_seconds: tuple[float, ...]  # how long each episode at its best θ took [s], as in all families
 
     @property
     def theta(self) -> Theta:
@@ -60,51 +53,31 @@ class TunedFamily:
 
 @dataclass(frozen=True)
 class Lesson:
-    """The worth of a family at its best θ as a teacher.
+    """The worth of a family at its best θ as a teacher."""
 
-    Attributes:
-        theta: The best θ that taught.
-        zero_shot: Score on the target before any target sample; None where it could not teach.
-        needed: Target samples needed after it.
-        plv: Target samples saved.
-        more: How many more are needed after it than after the family of highest PLV; None of that one itself.
-        failure: Why it could not teach, empty if it could.
-    """
-
-    theta: Theta
-    zero_shot: float | None = None
-    needed: LearningEstimate | None = None
-    plv: LearningEstimate | None = None
-    more: LearningEstimate | None = None
-    failure: str = ""
+    theta: Theta  # the best θ that taught
+    zero_shot: float | None = None  # score on the target before any target sample; None where it could not teach
+    needed: LearningEstimate | None = None  # target samples needed after it
+    plv: LearningEstimate | None = None  # target samples saved
+    more: LearningEstimate | None = None  # needed beyond the family of highest PLV; None of that one
+    failure: str = ""  # why it could not teach, empty if it could
 
 
 @dataclass(frozen=True)
 class BestFamilies:
-    """The family that is best at something.
+    """The family that is best at something."""
 
-    Attributes:
-        best: Its name; None where that is not known.
-        alike: The others that cannot be told from it.
-    """
-
-    best: str | None = None
-    alike: tuple[str, ...] = ()
+    best: str | None = None  # its name; None where that is not known
+    alike: tuple[str, ...] = ()  # the others that cannot be told from it
 
 
 @dataclass(frozen=True)
 class ComparedFamilies:
-    """Several tuned families.
+    """Several tuned families."""
 
-    Attributes:
-        settings: Of the study that they are of.
-        families: In the order of study.toml.
-        lessons: What each is worth as a teacher, by name; empty where that was not asked for, or is not known yet.
-    """
-
-    settings: StudySettings
-    families: tuple[TunedFamily, ...]
-    lessons: Mapping[str, Lesson] = field(default_factory=dict)
+    settings: StudySettings  # of the study that they are of
+    families: tuple[TunedFamily, ...]  # in the order of study.toml
+    lessons: Mapping[str, Lesson] = field(default_factory=dict)  # by name; empty where not asked for, or not known
 
     @cached_property
     def selection(self) -> Selection | None:

@@ -6,6 +6,7 @@ study's own are all there (`read_target`). The objective is a measure of how far
 mean scores, PRPV unless study.toml says otherwise; what others bring as a measure is tried before any episode is run.
 """
 
+import functools
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
@@ -154,29 +155,21 @@ def _as_objective(name: str, measure: Measure) -> Objective:
         )
     of_means = measure.on_means
     if measure not in MEASURES:
-        of_means = _CheckedMeasure(name, measure.on_means)
+        of_means = functools.partial(_of_users_measure, name, measure.on_means)
         # Tried as a search calls it: several proxies against one target, before any episode is run.
         means = np.random.default_rng(0).uniform(1.0, 2.0, TRIED)
         of_means(means, means[0], [Metric("one"), Metric("other", "min")])
     return Objective(name, measure.name, not measure.lower_is_better, of_means)
 
 
-@dataclass(frozen=True)
-class _CheckedMeasure:
+def _of_users_measure(name: str, on_means: OfMeans, proxy: Floats, target: Floats, metrics: Sequence[Metric]) -> Floats:
     """A measure of mean scores that is not ours: what it does wrong is told in one line."""
-
-    name: str
-    on_means: OfMeans
-
-    def __call__(self, proxy: Floats, target: Floats, metrics: Sequence[Metric]) -> Floats:
-        where = f" for means {proxy.shape} against {target.shape}"
-        values = ask(
-            f"measure '{self.name}'", lambda: np.asarray(self.on_means(proxy, target, metrics), dtype=float), where
-        )
-        if values.shape != proxy.shape[:-2]:
-            told = f"measure '{self.name}' gives values {values.shape} of means {proxy.shape}"
-            raise ExtensionError(f"{told}; give one for each table, {proxy.shape[:-2]}")
-        return values
+    where = f" for means {proxy.shape} against {target.shape}"
+    values = ask(f"measure '{name}'", lambda: np.asarray(on_means(proxy, target, metrics), dtype=float), where)
+    if values.shape != proxy.shape[:-2]:
+        told = f"measure '{name}' gives values {values.shape} of means {proxy.shape}"
+        raise ExtensionError(f"{told}; give one for each table, {proxy.shape[:-2]}")
+    return values
 
 
 KEPT = {one.key: _as_objective(one.key, one) for one in MEASURES if one.on_means is not None and not one.per_metric}

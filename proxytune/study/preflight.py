@@ -171,21 +171,13 @@ class Place(NamedTuple):
 
 @dataclass(frozen=True)
 class Preflight:
-    """The knowledge of a study of its parameters before its first trial.
+    """The knowledge of a study of its parameters before its first trial."""
 
-    Attributes:
-        base: The domain instance from which they were moved.
-        movements: One per parameter, in the order of the box.
-        episodes: How many episodes it took.
-        failure: Why the first of them failed, where all of them did; else empty.
-        not_repeatable: One line for each agent that scores otherwise when it drives the same episode again.
-    """
-
-    base: Theta
-    movements: tuple[Movement, ...]
-    episodes: int
-    failure: str = ""
-    not_repeatable: tuple[str, ...] = ()
+    base: Theta  # the domain instance from which they were moved
+    movements: tuple[Movement, ...]  # one per parameter, in the order of the box
+    episodes: int  # how many episodes it took
+    failure: str = ""  # why the first of them failed, where all of them did; else empty
+    not_repeatable: tuple[str, ...] = ()  # a line for each agent that scores otherwise in the same episode
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -209,7 +201,7 @@ def run_preflight(run: StudyRun) -> Preflight | None:
     """
     if run.finished_trials():
         return None
-    learnt = _preflight(run, functools.partial(_simulate, run))
+    learnt = _preflight(run, drive=True)
     if learnt is None or learnt.failure:
         return learnt
     first = _places(run.settings, 0)[0]
@@ -219,19 +211,10 @@ def run_preflight(run: StudyRun) -> Preflight | None:
 
 def preflight_of(run: StudyRun) -> Preflight | None:
     """The pre-flight from what has been simulated; None if it is off, or an episode is still missing."""
-    return _preflight(run, lambda look, added: None)
+    return _preflight(run, drive=False)
 
 
-def _simulate(run: StudyRun, look: int, added: Sequence[Episode]) -> None:
-    what = f"pre-flight {look + 1} of {LOOKS}"
-    run.watcher.begin(what, _most(run.settings, look) - len(added))
-    outcomes = run.outcomes(added, what)
-    run.watcher.finished(what)
-    if look == 0:
-        check_some_work(outcomes.values(), "the pre-flight")
-
-
-def _preflight(run: StudyRun, simulate: Callable[[int, Sequence[Episode]], None]) -> Preflight | None:
+def _preflight(run: StudyRun, *, drive: bool) -> Preflight | None:
     settings = run.settings
     if not settings.preflight:
         return None
@@ -240,7 +223,13 @@ def _preflight(run: StudyRun, simulate: Callable[[int, Sequence[Episode]], None]
     undecided = settings.space.intervals
     for look in range(LOOKS):
         before, now = (_plan(settings, _places(settings, n), undecided) for n in (look - 1, look))
-        simulate(look, now[len(before) :])
+        if drive:
+            what, added = f"pre-flight {look + 1} of {LOOKS}", now[len(before) :]
+            run.watcher.begin(what, _most(settings, look) - len(added))
+            outcomes = run.outcomes(added, what)
+            run.watcher.finished(what)
+            if look == 0:
+                check_some_work(outcomes.values(), "the pre-flight")
         known = run.known(now)
         if len(known) < len(now):
             return None

@@ -62,15 +62,9 @@ class Deciding(Protocol):
 def act_together(
     agents: Sequence[Deciding], pictures: NDArray[np.uint8] | Seen, memories: Sequence[Any]
 ) -> tuple[NDArray[np.float64], list[Any]]:
-    """Ask several agents at once, each for the command that it would give by itself, to the bit.
+    """The commands (n, 2) that the agents of several robots would give by themselves, to the bit, and their memories.
 
-    Args:
-        agents: One for each robot, the same for several robots or not.
-        pictures: The newest of each robot (n, rows, columns, 3); or what is known of them, while they are the newest.
-        memories: Of each robot's agent.
-
-    Returns:
-        The commands (n, 2), and the memories for the next pictures.
+    Pictures are the newest of each robot (n, rows, columns, 3); or what is known of them, while they are the newest.
     """
     seen = pictures if isinstance(pictures, Seen) else Seen(parted(pictures))
     if len(agents) == 1:

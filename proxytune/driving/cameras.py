@@ -45,16 +45,9 @@ class GroundPlaneCamera:
     def expose(
         self, poses: NDArray[np.floating[Any]], weights: Signal, first: int = 0, level: Any = np.uint8
     ) -> NDArray[Any]:
-        """Expose while it moves.
+        """Weighted means (n, 3, rows, columns) of what it sees from poses at several times (n, times, 3).
 
-        Args:
-            poses: Of each robot at several times, (n, times, 3).
-            weights: Of those times.
-            first: The first pixel that is looked at; those before may be anything.
-            level: Kind of the levels, 0 to 255; bytes are rounded.
-
-        Returns:
-            Weighted means of what it sees at those times, (n, 3, rows, columns).
+        Pixels before the first may be anything; `level` is the kind of levels, 0 to 255, of which bytes are rounded.
         """
         on_floor = max(first, self._sky)
         if on_floor not in self._tables:
@@ -137,17 +130,11 @@ def _blur_octaves(figures: CameraFigures, floor: Floor) -> NDArray[np.int64]:
 
 
 class _Exposed:
-    """Film on which a picture is a weighted mean of what the camera saw at the last ticks, which is all that blur does.
+    """Film on which a picture is a weighted mean of what was seen at the last ticks, which is all that blur does."""
 
-    Attributes:
-        partial: Whether it can show parts, and the same picture again.
-    """
+    partial = True  # it can show parts, and the same picture again
 
-    partial = True
-
-    def __init__(
-        self, camera: GroundPlaneCamera, weights: Signal, contexts: Sequence[FilterContext], level: Any
-    ) -> None:
+    def __init__(self, camera: Any, weights: Signal, contexts: Sequence[FilterContext], level: Any) -> None:
         self._camera, self._weights, self._level = camera, weights, level
         self._poses = np.repeat(np.stack([context.rest for context in contexts])[:, None], len(weights), axis=1)
 
@@ -159,24 +146,23 @@ class _Exposed:
 
     def expose(self, robots: Sequence[int], first: int) -> NDArray[Any]:
         """The newest pictures (n, 3, rows, columns) of robots, right from the first pixel on."""
-        return self._camera.expose(self._poses[list(robots)], self._weights, first, self._level)
+        return np.asarray(self._camera.expose(self._poses[list(robots)], self._weights, first, self._level))
 
 
-class _Averaged:
+class _Averaged(_Exposed):
     """The same of a camera that can only render, which it does once for each pose."""
 
     partial = False
 
     def __init__(self, camera: Renderer, weights: Signal, contexts: Sequence[FilterContext], level: Any) -> None:
-        self._camera, self._weights, self._level = camera, weights, level
-        self._poses = np.repeat(np.stack([context.rest for context in contexts])[:, None], len(weights), axis=1)
+        super().__init__(camera, weights, contexts, level)
         self._rendered: dict[int, NDArray[np.uint8]] = {}
         self._new = len(weights)
 
     def see(self, poses: Signal) -> None:
-        """Let in the poses (robots, ticks, 3) since the picture before; the last are kept, as many as are averaged."""
+        """Let in the poses (robots, ticks, 3) since the picture before."""
+        super().see(poses)
         self._new = min(self._new + poses.shape[1], len(self._weights))
-        self._poses = np.concatenate((self._poses, poses), axis=1)[:, -len(self._weights) :]
 
     def expose(self, robots: Sequence[int], first: int) -> NDArray[Any]:
         """The newest pictures (n, 3, rows, columns) of robots."""
@@ -236,7 +222,7 @@ class Views:
         mixing, self._alone = image.parted()
         weights = mixing.mean_weights(contexts[0].rate_hz)
         level = np.float32 if self._alone.effects else np.uint8
-        self._film: _Mixed | _Exposed | _Averaged
+        self._film: _Mixed | _Exposed
         if weights is None:
             self._film = _Mixed(camera, mixing, developed)
         elif isinstance(camera, GroundPlaneCamera):

@@ -137,31 +137,21 @@ def grouped(drivers: Sequence[Driver]) -> list[list[int]]:
     return [numbers for key, numbers in members.items() if key is None or len(numbers) > 1]
 
 
-class Shown:
-    """What drivers are shown: kept while the pictures are the newest.
+Shown = list[tuple[list[int], Callable[[list[Any]], Any]]]
+"""Numbers of drivers that are asked at once, and how: by what they look at, or by their own `act_many`."""
 
-    Attributes:
-        alone: Gives what the drivers of some numbers see, who are asked one by one.
-        groups: Numbers of drivers that are asked at once, and how: by what they look at, or by their own `act_many`.
-    """
 
-    def __init__(
-        self,
-        drivers: Sequence[Driver],
-        alone: Callable[[list[int]], Iterable[Any]],
-        draw: Callable[[int], NDArray[np.uint8]],
-        groups: Sequence[list[int]],
-    ) -> None:
-        """Show each group its part."""
-        self.alone = alone
-        self.groups: list[tuple[list[int], Callable[[list[Any]], Any]]] = []
-        for numbers in groups:
-            of_group: list[Any] = [drivers[number] for number in numbers]
-            if _looks(of_group[0]):
-                self.groups.append((numbers, functools.partial(act_together, of_group, Seen(draw, rows_of(numbers)))))
-            else:
-                pictures = joined(draw(0)[rows_of(numbers)])
-                self.groups.append((numbers, functools.partial(of_group[0].act_many, pictures)))
+def show(drivers: Sequence[Driver], draw: Callable[[int], NDArray[np.uint8]], groups: Sequence[list[int]]) -> Shown:
+    """Show each group its part of the pictures, to be kept while these are the newest."""
+    shown: Shown = []
+    for numbers in groups:
+        of_group: list[Any] = [drivers[number] for number in numbers]
+        if _looks(of_group[0]):
+            shown.append((numbers, functools.partial(act_together, of_group, Seen(draw, rows_of(numbers)))))
+        else:
+            pictures = joined(draw(0)[rows_of(numbers)])
+            shown.append((numbers, functools.partial(of_group[0].act_many, pictures)))
+    return shown
 
 
 def _looks(driver: Any) -> bool:
@@ -170,23 +160,26 @@ def _looks(driver: Any) -> bool:
 
 
 def ask_many(
-    drivers: Sequence[Driver], shown: Shown, memories: Sequence[Any], time_s: float
+    drivers: Sequence[Driver],
+    shown: Shown,
+    see: Callable[[list[int]], Iterable[Any]],
+    memories: Sequence[Any],
+    time_s: float,
 ) -> tuple[Signal, list[Any], dict[int, EpisodeError]]:
     """Ask drivers for their next commands, together where they can: one by one the culprit of an error is named.
 
-    Returns:
-        Commands (drivers, 2), memories for the ones after, and by its number why a driver failed, with the time [s].
+    Those are asked by what they `see`. Gives commands (drivers, 2), memories, and by its number why a driver failed.
     """
     commands, after, failed = np.zeros((len(drivers), 2)), list(memories), {}
     alone = set(range(len(drivers)))
-    for numbers, act in shown.groups:
+    for numbers, act in shown:
         together = _ask_together(act, [memories[number] for number in numbers])
         if together is not None:
             commands[numbers], kept = together
             alone.difference_update(numbers)
             for number, memory in zip(numbers, kept, strict=True):
                 after[number] = memory
-    for number, seen in zip(sorted(alone), shown.alone(sorted(alone)) if alone else (), strict=True):
+    for number, seen in zip(sorted(alone), see(sorted(alone)) if alone else (), strict=True):
         try:
             commands[number], after[number] = ask(drivers[number], seen, memories[number], time_s)
         except EpisodeError as problem:
@@ -206,11 +199,7 @@ def _ask_together(act: Callable[[list[Any]], Any], memories: list[Any]) -> tuple
 
 
 def ask(driver: Driver, seen: Any, memory: Any, time_s: float) -> tuple[Command, Any]:
-    """A driver's next command and memory.
-
-    Raises:
-        EpisodeError: With the time [s], if it raises or its answer is not two finite duties.
-    """
+    """A driver's next command and memory; refused, with the time [s], where it raises or these are none."""
     try:
         answer, memory = driver.act(seen, memory)
         command = np.asarray(answer, dtype=float)
@@ -317,16 +306,7 @@ def driving_score(road: Road, poses: Floats, *, wheel_distance: float, tick_s: f
 
     Each second with one wheel outside the lane takes one off, each with both wheels two, so 60 s are worth −60 to 60.
     It ends where the robot leaves the map. Standing still in the lane counts as driving, as it does in the paper.
-
-    Args:
-        road: The map.
-        poses: x [m], y [m], heading [rad] at a constant rate, shape (samples, 3).
-        wheel_distance: Distance between the wheels [m].
-        tick_s: Time between two poses [s].
-        seconds: When time is over [s].
-
-    Raises:
-        EpisodeError: If a pose is not finite.
+    Wheels are so far apart [m]; else as `score_trajectory`.
     """
     driven = _driven(road, poses, tick_s=tick_s, seconds=seconds)
     headings = driven[:, 2]

@@ -30,6 +30,7 @@ from proxytune.driving.episode import (
     grouped,
     measured,
     picture_only,
+    show,
 )
 from proxytune.driving.expert import Pupil
 from proxytune.driving.optics import joined
@@ -50,11 +51,7 @@ class Fleet(Protocol):
     """Robots side by side, each on a floor of its own."""
 
     def move(self, twists: Signal, robots: Sequence[int], /) -> tuple[Signal, Sequence[bool]]:
-        """Let some robots follow their twists (robots, time, 3), each for one tick.
-
-        Returns:
-            Their poses after each tick (robots, time, 3), and whether each has hit something or fallen over.
-        """
+        """The poses (robots, time, 3) that twists of some robots lead to, a tick each, and whether each has crashed."""
 
 
 @dataclass(frozen=True)
@@ -263,15 +260,8 @@ def drive_fleet(
 ) -> list[Drive | EpisodeError]:
     """Drive robots side by side, each until the time is over, it crashes, its course ends or its driver fails.
 
-    Args:
-        instances: What bends each robot's commands, motion and pictures.
-        fleet: What moves, at the starts.
-        drivers: Who drives each.
-        courses: What each drives, all for the same time.
-        sees: What a driver is shown of the picture and the true pose; an expert's is `Sight`.
-
-    Returns:
-        Each robot's drive; an EpisodeError where its agent raised, or its answer was not two finite duties.
+    Courses are for the same time, the fleet is at their starts, and drivers are shown what `sees` makes of picture and
+    true pose (an expert's is `Sight`). Gives each robot's drive, or an EpisodeError where its driver failed.
     """
     control_hz = instances[0].robot.figures["control_rate"]
     drives = _Drives(Rollouts(instances, courses, fleet), drivers, sees)
@@ -308,13 +298,14 @@ class _Drives:
         """Ask for the next commands; a policy that has seen the pictures before would answer the same."""
         if not self.drivers or (self._by_picture and not self.rollouts.new_pictures):
             return
+        see: Callable[[list[int]], Any] = self.rollouts.pictures
         if self._sees is not picture_only:
             sights = zip(self.rollouts.pictures(), self.rollouts.poses[:, -1], strict=True)
             seen = [self._sees(*one) for one in sights]
-            self._shown = Shown(self.drivers, lambda rows: [seen[row] for row in rows], self.rollouts.planes, ())
+            self._shown, see = [], lambda rows: [seen[row] for row in rows]
         elif self._shown is None or self.rollouts.new_pictures:
-            self._shown = Shown(self.drivers, self.rollouts.pictures, self.rollouts.planes, self._groups)
-        self._commands, self._memories, problems = ask_many(self.drivers, self._shown, self._memories, time_s)
+            self._shown = show(self.drivers, self.rollouts.planes, self._groups)
+        self._commands, self._memories, problems = ask_many(self.drivers, self._shown, see, self._memories, time_s)
         self._fail(problems)
 
     def step(self, number: int) -> None:

@@ -126,14 +126,9 @@ def find_nearest(layout: RoadLayout, positions: Floats) -> NearestPoints:
 
 
 def way_round(layout: RoadLayout, section: Numbers, straight: Floats, turned: Floats, offset: Floats) -> Floats:
-    """Way round the map to a point of a line beside the centre line, counter-clockwise [m].
+    """Way round the map, counter-clockwise [m], to a point of the line that is `offset` right of the centre line [m].
 
-    Args:
-        layout: Of the road.
-        section: Number of the section it lies on.
-        straight: How far from the origin it lies in the direction of the section's straight [m].
-        turned: How much of the section's bend lies behind it [rad].
-        offset: How far right of the centre line that line is [m].
+    Section, straight and turned are that point's as `NearestPoints` has them.
     """
     edges = layout.straights[section] + straight - layout.first[section]
     others = layout.other_arcs[section] + offset * layout.other_turns[section]

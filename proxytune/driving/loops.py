@@ -5,7 +5,8 @@ By Numba where that pays, else by NumPy, to the same bit, so that which one is t
 
 import functools
 import sys
-from typing import Any, NamedTuple, Protocol, cast
+from types import ModuleType
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -97,15 +98,9 @@ class Eyes(NamedTuple):
 def find_lanes(eyes: Eyes, yellow: NDArray[np.uint8], bright: NDArray[np.uint8]) -> Floats:
     """Fit a line through the lane's centre, right of the yellow line and left of the white one, by least squares.
 
-    White pixels to the left of the yellow ones belong to the other lane's edge and are left out.
-
-    Args:
-        eyes: Where and how the robots look.
-        yellow: How yellow what they see is, (robots, pixels).
-        bright: How bright, (robots, pixels).
-
-    Returns:
-        Offset [m], slope and number of pixels, (robots, 3); where these are fewer than FEWEST, they alone count.
+    White pixels to the left of the yellow ones belong to the other lane's edge and are left out. Of how yellow and how
+    bright what they see is (robots, pixels), it makes offset [m], slope and number of pixels, (robots, 3); where these
+    are fewer than FEWEST, they alone count.
     """
     lanes = np.zeros((len(yellow), 3))
     golden, shining = yellow > eyes.yellow, bright > eyes.white
@@ -127,26 +122,16 @@ def find_lanes(eyes: Eyes, yellow: NDArray[np.uint8], bright: NDArray[np.uint8])
     return lanes
 
 
-class Loops(Protocol):
-    """A way to go through them: this module, or the compiled one."""
-
-    def expose(self, table: TexelTable, places: Places, weights: NDArray[np.float32], planes: NDArray[Any]) -> None:
-        """Write what robots see as the ends of planes (n, 3, pixels): means over their places (n · times, 6)."""
-
-    def find_lanes(self, eyes: Eyes, yellow: NDArray[np.uint8], bright: NDArray[np.uint8]) -> Floats:
-        """Offset [m], slope and number of pixels of lines through the lane's centre, (robots, 3)."""
-
-
-def fastest(pictures: int) -> Loops:
-    """The way that takes least time for some more pictures, loading included: asked anew for every use."""
+def fastest(pictures: int) -> ModuleType:
+    """The way that takes least time for some more pictures, loading included: this module, or the compiled one."""
     _used[0] += pictures
     return by_numba() if _used[0] > PAYS_OFF else _BY_NUMPY
 
 
 @functools.cache
-def by_numba() -> Loops:
+def by_numba() -> ModuleType:
     """The compiled way where it works, else that of NumPy."""
-    return cast(Loops, compiled_loops("proxytune.driving.compiled") or _BY_NUMPY)
+    return compiled_loops("proxytune.driving.compiled") or _BY_NUMPY
 
 
-_BY_NUMPY = cast(Loops, sys.modules[__name__])
+_BY_NUMPY = sys.modules[__name__]

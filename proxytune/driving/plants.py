@@ -320,16 +320,7 @@ def _radius(root: ET.Element, link: str) -> float | None:
 
 
 def integrate(start: Signal, twists: Signal, tick_s: float) -> Signal:
-    """The poses after each tick.
-
-    Args:
-        start: Starting poses (…, 3): x [m], y [m], heading [rad].
-        twists: Twists (…, time, 3), each held for a tick.
-        tick_s: Length of a tick [s].
-
-    Returns:
-        Poses (…, time, 3), headings unwrapped.
-    """
+    """The poses (…, time, 3) after ticks so long [s] from a start (…, 3), each with a twist; headings unwrapped."""
     turns = twists[..., 2] * tick_s
     headings = start[..., None, 2] + turns.cumsum(axis=-1)
     middles = headings - turns / 2.0

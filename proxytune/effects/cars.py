@@ -272,14 +272,10 @@ UNEVEN = "imbalance"
 def on_column(
     wheels: type[Any], column: int, name: str, does: str = "", changed: Mapping[str, Any] | None = None
 ) -> type[Effect]:
-    """An effect on wheels as one on a column.
+    """An effect on wheels as one on a column, under a name of its own.
 
-    Args:
-        wheels: Class of the effect on wheels.
-        column: THROTTLE or STEERING.
-        name: What it is called.
-        does: What it does, where the wheels' own docstring does not say it.
-        changed: What is different about its parameters: bounds, probes, source.
+    `does` says what it does where the wheels' own docstring does not, `changed` what is different about its parameters:
+    bounds, probes, source.
     """
     own = tuple(replace(one, **(changed or {})) for one in wheels.parameters if one.name != UNEVEN)
     even = {UNEVEN: 0.0} if len(own) < len(wheels.parameters) else {}

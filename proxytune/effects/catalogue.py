@@ -258,10 +258,6 @@ class Catalogue:
         """The effects that a domain family of it has before anything is found to be missing."""
         return DECLARED if self.drive == "differential" else DECLARED_OF_CARS
 
-    def hint(self, name: str) -> str:
-        """A hint that ends an error line on an effect or a parameter that it does not have."""
-        return parameter_hint(name, self.parameters)
-
     @property
     def names(self) -> tuple[str, ...]:
         """The effects to choose from: those shipped in the order in which the signal meets them, plug-ins, `own`.
@@ -373,7 +369,7 @@ def _value(name: str, parameter: Parameter, theta: Theta, nominal: Mapping[str, 
 def _check(name: str, value: float, catalogue: Catalogue) -> None:
     parameters = catalogue.parameters
     if name not in parameters:
-        raise SettingsError(f"{name}: no effect has this parameter; {catalogue.hint(name)}")
+        raise SettingsError(f"{name}: no effect has this parameter; {parameter_hint(name, parameters)}")
     parameter = parameters[name]
     if not parameter.low <= value <= parameter.high:
         raise SettingsError(

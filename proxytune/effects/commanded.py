@@ -49,14 +49,8 @@ class Commands(NamedTuple):
 class CommandState(NamedTuple):
     """The past of the next chunk: `Commands` without the time axis, and the sign of each wheel's last motion."""
 
-    duty: Signal
+    last: Commands
     sign: Signal
-    held: Signal
-    begun: Signal
-    turned: Signal
-    dragged: Signal
-    slow: Signal
-    ramped: Signal
     rate_hz: float
 
 
@@ -133,7 +127,7 @@ class LearntCommands:
         dragged, slow, ramped = (
             np.repeat(rest[..., None], len(self._knots(name)), axis=-1) for name in ("dragged", "ended", "ramped")
         )
-        return CommandState(rest, np.sign(rest), long, begun, long, dragged, slow, ramped, context.rate_hz)
+        return CommandState(Commands(rest, long, begun, long, dragged, slow, ramped), np.sign(rest), context.rate_hz)
 
     def apply(self, signal: Signal, memory: CommandState) -> tuple[Signal, CommandState]:
         """Add what the curves say."""
@@ -159,38 +153,28 @@ class LearntCommands:
             newest = np.maximum.accumulate(np.where(event, number, -before[..., None, :] * past.rate_hz), axis=-2)
             return np.asarray((number - newest) / past.rate_hz)
 
-        before = np.concatenate((past.duty[..., None, :], signal), axis=-2)
+        last, before = past.last, np.concatenate((past.last.duty[..., None, :], signal), axis=-2)
         changed = (np.abs(np.diff(before, axis=-2)) > SAME).any(axis=-1, keepdims=True)
         # A delay that is no whole number of samples mixes two commands: one of each sign make no stop.
         still = np.abs(before) < STILL
         wheels = np.moveaxis(signal, -2, -1)
         course = newest_signs(np.concatenate((past.sign[..., None], np.sign(wheels)), axis=-1))
         turned = np.moveaxis(np.diff(course, axis=-1) * course[..., :-1] != 0.0, -1, -2)
-        dragged = np.moveaxis(play(wheels, past.dragged, self._knots("dragged")), -2, -3)
-        slow = np.moveaxis(low_passes(wheels, past.slow, self._knots("ended"), past.rate_hz), -2, -3)
+        dragged = np.moveaxis(play(wheels, last.dragged, self._knots("dragged")), -2, -3)
+        slow = np.moveaxis(low_passes(wheels, last.slow, self._knots("ended"), past.rate_hz), -2, -3)
         fewest = np.maximum(np.reshape(self._knots("ramped"), (-1, 2)) * past.rate_hz, 1.0 / LONG_S)
-        ramped = np.moveaxis(ramp(wheels, past.ramped, *(1.0 / fewest.T)), -2, -3)
+        ramped = np.moveaxis(ramp(wheels, last.ramped, *(1.0 / fewest.T)), -2, -3)
         commands = Commands(
             duty=signal,
-            held=since(np.broadcast_to(changed, signal.shape), past.held),
-            begun=since(still[..., 1:, :] & still[..., :-1, :], past.begun),
-            turned=since(turned, past.turned),
+            held=since(np.broadcast_to(changed, signal.shape), last.held),
+            begun=since(still[..., 1:, :] & still[..., :-1, :], last.begun),
+            turned=since(turned, last.turned),
             dragged=dragged,
             slow=slow,
             ramped=ramped,
         )
-        after = CommandState(
-            duty=signal[..., -1, :],
-            sign=course[..., -1],
-            held=commands.held[..., -1, :],
-            begun=commands.begun[..., -1, :],
-            turned=commands.turned[..., -1, :],
-            dragged=dragged[..., -1, :, :],
-            slow=slow[..., -1, :, :],
-            ramped=ramped[..., -1, :, :],
-            rate_hz=past.rate_hz,
-        )
-        return commands, after
+        newest = Commands._make(part.take(-1, axis=signal.ndim - 2) for part in commands)
+        return commands, CommandState(newest, course[..., -1], past.rate_hz)
 
 
 def _basis(curve: LearntCurve) -> Callable[[Commands, Knots], Signal]:

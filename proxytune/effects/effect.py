@@ -343,10 +343,9 @@ def lfilter(*words: Any, **named: Any) -> Any:
 
 
 def low_pass(signal: Signal, state: LowPassState) -> tuple[Signal, LowPassState]:
-    """Follow a signal (…, time, channels) with a first-order lag, exactly for one that holds over each sample.
+    """The mean over each sample of what follows a signal (…, time, channels), and the state after the last one.
 
-    Returns:
-        The mean over each sample of what follows (…, time, channels), and the state after the last one.
+    It follows with a first-order lag, exactly for a signal that holds over each sample.
     """
     value, remainder, mean_remainder = state
     start, gain = value[..., None, :], 1.0 - remainder

@@ -149,9 +149,16 @@ def body_after_reversal(asked: AskedMotion, knots: Knots) -> Signal:
     return np.asarray(asked.forward[..., None] * np.exp(-np.abs(asked.rolled[2])[..., None] / np.asarray(knots)))
 
 
-def waves(wave: Callable[[Signal], Signal]) -> Callable[[AskedMotion, Knots], Signal]:
-    """Harmonics of the heading while the robot moves."""
-    return lambda a, k: wave(a.heading[..., None] * np.asarray(k)) * moving(a)[..., None]
+def waves(
+    wave: Callable[[Signal], Signal], share_of: Callable[[AskedMotion], Signal] | None = None
+) -> Callable[[AskedMotion, Knots], Signal]:
+    """Harmonics of the heading while the robot moves, as shares of something or as they are."""
+
+    def basis(asked: AskedMotion, knots: Knots) -> Signal:
+        plain = wave(asked.heading[..., None] * np.asarray(knots)) * moving(asked)[..., None]
+        return plain * share_of(asked)[..., None] if share_of else plain
+
+    return basis
 
 
 class Channel(NamedTuple):
@@ -186,6 +193,13 @@ def _of_wheels(unit: str, basis: Callable[[AskedMotion, Knots, int], Signal], en
         f"left{ending}": Channel("left", unit, lambda a, k: basis(a, k, 0)),
         f"right{ending}": Channel("right", unit, lambda a, k: basis(a, k, 1)),
     }
+
+
+def _of_heading(
+    name: str, to: str, unit: str, share_of: Callable[[AskedMotion], Signal] | None = None
+) -> dict[str, Channel]:
+    """A channel of cosines and one of sines."""
+    return {f"{name}_{wave.__name__}": Channel(to, unit, waves(wave, share_of)) for wave in (np.cos, np.sin)}
 
 
 LEVEL = "level"
@@ -323,26 +337,12 @@ MOTION_GROUPS: Mapping[str, Group] = MappingProxyType(
             "heading",
             "turns a turn",
             {
-                "forward_cos": Channel("forward", "m/s", waves(np.cos)),
-                "forward_sin": Channel("forward", "m/s", waves(np.sin)),
-                "sideways_cos": Channel("sideways", "m/s", waves(np.cos)),
-                "sideways_sin": Channel("sideways", "m/s", waves(np.sin)),
-                "veer_cos": Channel("yaw", "rad/m", lambda a, k: waves(np.cos)(a, k) * np.abs(a.forward)[..., None]),
-                "veer_sin": Channel("yaw", "rad/m", lambda a, k: waves(np.sin)(a, k) * np.abs(a.forward)[..., None]),
-                "ahead_cos": Channel(
-                    "forward", "of the speed", lambda a, k: waves(np.cos)(a, k) * a.forward[..., None]
-                ),
-                "ahead_sin": Channel(
-                    "forward", "of the speed", lambda a, k: waves(np.sin)(a, k) * a.forward[..., None]
-                ),
-                "aside_cos": Channel(
-                    "sideways", "of the speed", lambda a, k: waves(np.cos)(a, k) * a.forward[..., None]
-                ),
-                "aside_sin": Channel(
-                    "sideways", "of the speed", lambda a, k: waves(np.sin)(a, k) * a.forward[..., None]
-                ),
-                "yaw_cos": Channel("yaw", "of the yaw rate", lambda a, k: waves(np.cos)(a, k) * a.yaw[..., None]),
-                "yaw_sin": Channel("yaw", "of the yaw rate", lambda a, k: waves(np.sin)(a, k) * a.yaw[..., None]),
+                **_of_heading("forward", "forward", "m/s"),
+                **_of_heading("sideways", "sideways", "m/s"),
+                **_of_heading("veer", "yaw", "rad/m", lambda a: np.abs(a.forward)),
+                **_of_heading("ahead", "forward", "of the speed", lambda a: a.forward),
+                **_of_heading("aside", "sideways", "of the speed", lambda a: a.forward),
+                **_of_heading("yaw", "yaw", "of the yaw rate", lambda a: a.yaw),
             },
             1.0,
         ),
@@ -402,14 +402,7 @@ def ramp(signal: Signal, before: Signal, grows: Signal, shrinks: Signal) -> Sign
 
 
 def moved_since(speed: Signal, before: Signal, rest_speed: float, rate_hz: float) -> Signal:
-    """Time since a wheel last stood [s] (…, time), 0 while it does.
-
-    Args:
-        speed: Its speed (…, time).
-        before: How long ago that was before the first sample (…,).
-        rest_speed: It stands where it is slower than this, in the same unit.
-        rate_hz: Samples per second.
-    """
+    """Time since a wheel last stood, slower than a rest speed [s] (…, time); `before` the first sample so long (…,)."""
     number = np.arange(1.0, speed.shape[-1] + 1.0)
     stood = np.where(np.abs(speed) < rest_speed, number, -before[..., None] * rate_hz)
     return np.asarray((number - np.maximum.accumulate(stood, axis=-1)) / rate_hz)
@@ -428,10 +421,7 @@ LONG_M = 10.0
 def rolled_since(speed: Signal, before: Signal, rate_hz: float) -> Signal:
     """Way that a wheel has rolled since it last turned the other way [m] (…, time), negative backwards.
 
-    Args:
-        speed: Its speed [m/s] (…, time). Slower than REST_SPEED it turns no other way.
-        before: How far it had rolled so before the first sample (…,), 0 where it has not moved yet.
-        rate_hz: Samples per second.
+    Slower than REST_SPEED it turns no other way. `before` the first sample it had rolled so far (…,), 0 if not at all.
     """
     now = np.where(np.abs(speed) < REST_SPEED, 0.0, np.sign(speed))
     course = newest_signs(np.concatenate((np.sign(before)[..., None], now), axis=-1))

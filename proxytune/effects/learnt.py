@@ -156,14 +156,7 @@ class Learnt:
         return self._constants("transients") or self._constants("changes")
 
     def recall(self, context: FilterContext, signal: Signal, row: Signal, sample: Signal) -> LearntState:
-        """The memory as of given samples of longer signals: the past of windows that begin amid drives.
-
-        Args:
-            context: Of the windows (W, …).
-            signal: What was asked for from the start on (rows, time, 3).
-            row: The row of each window (W,).
-            sample: The sample of its row at which each window begins (W,).
-        """
+        """The memory of windows (W, …) that begin at a sample (W,) of a row (W,) of longer signals (rows, time, 3)."""
         whole = self.begin(FilterContext(context.rate_hz, np.zeros((len(signal), 3)), context.nominal))
         asked, _ = self._asked(signal, whole)
 

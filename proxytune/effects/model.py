@@ -9,7 +9,7 @@ from typing import cast
 
 import numpy as np
 
-from proxytune.effects.catalogue import DRIVES, SHIPPED, Catalogue, effect_of
+from proxytune.effects.catalogue import DRIVES, SHIPPED, Catalogue, effect_of, parameter_hint
 from proxytune.effects.effect import Effect, FilterContext, Memory, Recalling, Separate, Signal, Stage
 from proxytune.effects.learnt import Learnt, is_learnt, learnt_text, read_learnt
 from proxytune.errors import ExtensionError
@@ -108,8 +108,9 @@ def read_effects(
 def _parameters(section: Section, effect: str, catalogue: Catalogue) -> dict[str, Parameter]:
     """The parameters of an effect by their names in θ."""
     if not catalogue.knows(effect):
-        elsewhere = any(effect in effects for effects in DRIVES.values())
-        hint = catalogue.hint(effect) if elsewhere else nearest(effect, (*catalogue.names, Learnt.name))
+        hint = nearest(effect, (*catalogue.names, Learnt.name))
+        if any(effect in effects for effects in DRIVES.values()):
+            hint = parameter_hint(effect, catalogue.parameters)
         raise section.error(effect, f"no such effect; {hint} (your own is written module:Attribute)")
     try:
         return dict(zip(catalogue.theta_names(effect), catalogue.effect(effect).parameters, strict=True))
@@ -153,14 +154,10 @@ class Chain:
     def begin_amid(
         self, context: FilterContext, whole: FilterContext, signal: Signal, row: Signal, sample: Signal
     ) -> Memory:
-        """The memories of windows that begin amid longer signals: what came before counts where an effect recalls it.
+        """The memories of windows (W, …) that begin at a sample (W,) of a row (W,) of longer signals.
 
-        Args:
-            context: Of the windows (W, …).
-            whole: Of the longer signals.
-            signal: Those signals from their start on (rows, time, channels).
-            row: The row of each window (W,).
-            sample: The sample of its row at which each window begins (W,).
+        What came before, in those signals (rows, time, channels) of the context `whole`, counts where an effect recalls
+        it.
         """
         memories = list(self.begin(context))
         recalling = [number for number, effect in enumerate(self.effects) if isinstance(effect, Recalling)]

@@ -108,17 +108,10 @@ class Predicting:
 
 
 def load_agent(name: Any, folder: Path, space: Any, seed: int) -> Act:
-    """An agent ready for one episode; a class is made anew for each.
+    """An agent ready for one episode, whose actions are of this space; refused where there is none.
 
-    Args:
-        name: "random", "zero", or `module:attribute`: a function, an object with `predict`, or a class of either; or
-            one of these itself.
-        folder: Where a user's modules lie.
-        space: The environment's actions.
-        seed: Of the agent "random".
-
-    Raises:
-        InputError: If there is no such agent, or the actions have no zero.
+    It is "random", which draws by the seed, "zero", or `module:attribute`: a function, an object with `predict`, or a
+    class of either, made anew for each episode; or one of these itself.
     """
     if isinstance(name, str) and name in BUILT_IN:
         if name == "zero" and (space.shape is None or space.dtype is None):

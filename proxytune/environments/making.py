@@ -144,9 +144,6 @@ def make_environment(settings: EnvironmentSettings, theta: Mapping[str, float]) 
     """An environment whose own parameters have the values of θ, neutral where θ leaves them out.
 
     A module before the name is imported first, from the study's folder or as installed, so that it can register.
-
-    Raises:
-        InputError: If it cannot be made, or has no such attribute.
     """
     values = {one: float(theta.get(one.parameter.name, one.parameter.neutral)) for one in settings.own}
     arguments = {**dict(settings.arguments), **{one.argument: value for one, value in values.items() if one.argument}}

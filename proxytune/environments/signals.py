@@ -50,12 +50,7 @@ class Spaces:
 
 
 def look_at(settings: EnvironmentSettings) -> Spaces:
-    """Make the environment once and see what it is.
-
-    Raises:
-        InputError: If it cannot be made.
-        SettingsError: If its settings do not fit it.
-    """
+    """Make the environment once and see what it is; refused if its settings do not fit it."""
     environment = make_environment(settings, {})
     try:
         box = gymnasium.spaces.Box

@@ -208,9 +208,6 @@ class Views:
     """What the cameras of robots that drive side by side show through the image effects, at the camera's rate.
 
     Pictures that nobody asks for are not drawn.
-
-    Attributes:
-        changed: Whether the last poses brought new pictures; so they do to all robots or to none.
     """
 
     def __init__(self, camera: Renderer, image: Chain, contexts: Sequence[FilterContext]) -> None:
@@ -237,7 +234,7 @@ class Views:
         self._shows: list[int] = []
         self._first = sys.maxsize if self._film.partial and not self._alone.effects else 0
         self._let_in(1)
-        self.changed = True
+        self.changed = True  # whether the last poses brought new pictures; so they do to all robots or to none
 
     def pass_by(self, poses: Signal, robots: Sequence[int]) -> None:
         """Let robots under way see their poses (robots, ticks, 3) of the next ticks; the others have left for good."""

@@ -109,30 +109,18 @@ CAMERAS = ("ground_plane", "renderer")
 
 @dataclass(frozen=True)
 class LaneFollowing:
-    """S_Θ of a robot that follows a lane.
+    """S_Θ of a robot that follows a lane."""
 
-    Attributes:
-        robot: Name of the robot.
-        plant: One of PLANTS.
-        camera: One of CAMERAS.
-        map: The road, whether the package's or the user's own.
-        seconds: Longest time an episode takes [s].
-        position_noise_m: Standard deviation of where the robot is put down [m].
-        heading_noise_deg: Standard deviation of how it is turned [deg].
-        effects: Values of effects besides the robot's nominal ones, sorted by name.
-        folder: Where a user's own agents, effects and robots lie.
-        cautions: What is probably not meant in its robot or model, a sentence each.
-    """
-
-    robot: str
-    plant: str
-    camera: str
-    map: Road
-    seconds: float
-    position_noise_m: float
-    heading_noise_deg: float
-    effects: tuple[tuple[str, float], ...]
-    folder: Path
+    robot: str  # name of the robot
+    plant: str  # one of PLANTS
+    camera: str  # one of CAMERAS
+    map: Road  # the road, whether the package's or the user's own
+    seconds: float  # longest time an episode takes [s]
+    position_noise_m: float  # standard deviation of where the robot is put down [m]
+    heading_noise_deg: float  # standard deviation of how it is turned [deg]
+    effects: tuple[tuple[str, float], ...]  # values of effects besides the robot's nominal ones, sorted by name
+    folder: Path  # where a user's own agents, effects and robots lie
+    # what is probably not meant in its robot or model, a sentence each
     cautions: tuple[str, ...] = field(default=(), compare=False, repr=False)
 
     @property

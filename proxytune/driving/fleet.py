@@ -119,13 +119,9 @@ class _Apart:
 
 
 class _Band:
-    """Robots of a fleet that are of one domain instance.
+    """Robots of a fleet that are of one domain instance, by their numbers in it.
 
-    Attributes:
-        robots: Their numbers in the fleet.
-        here: Which of them are still under way.
-        rows: Where these are among the fleet's robots under way.
-        views: What their cameras show; None where nobody looks.
+    Those of them `here` are still under way, in these `rows` among the fleet's; `views` are None where nobody looks.
     """
 
     def __init__(self, instance: Instance, robots: Sequence[int], courses: Sequence[Course], *, blind: bool) -> None:

@@ -65,8 +65,6 @@ CAMERA = (
 """What an agent's view needs."""
 EXPERT = ("expert_look_ahead", "expert_speed", "expert_gain", "expert_disturbance")
 """What the expert that teaches to drive it needs."""
-WHEELS = ("wheel_distance",)
-"""What an examination needs, which looks where each wheel is."""
 WITHOUT_BODY = 'use plant = "planar"'
 
 
@@ -110,22 +108,14 @@ class Robot:
         return self.figures["wheelbase"] / math.tan(math.radians(self.figures["wheel_angle"]))
 
     def body(self) -> Path:
-        """The URDF for the bullet plant.
-
-        Raises:
-            SettingsError: If the robot has no body.
-        """
+        """The URDF for the bullet plant; refused if the robot has none."""
         if self.urdf is None:
             raise SettingsError(f"robot '{self.name}' has no body: its robot.toml names no urdf; {WITHOUT_BODY}")
         self._need(BODY, "body", WITHOUT_BODY)
         return self.urdf
 
     def camera_figures(self) -> CameraFigures:
-        """The nominal camera: level, straight ahead, without distortion.
-
-        Raises:
-            SettingsError: If the robot has no camera.
-        """
+        """The nominal camera: level, straight ahead, without distortion; refused if the robot has none."""
         self._need(CAMERA, "camera", "choose a robot that has one")
         figures = self.figures
         return CameraFigures(
@@ -140,23 +130,14 @@ class Robot:
             k1=0.0,
         )
 
-    def expert_figures(self) -> tuple[float, float, float, float]:
-        """Look-ahead [m], speed [m/s], gain and disturbance [duty] of the expert that teaches to drive this robot.
-
-        Raises:
-            SettingsError: If the robot has none.
-        """
+    def expert_figures(self) -> tuple[float, ...]:
+        """Look-ahead [m], speed [m/s], gain and disturbance [duty] of the robot's expert; refused if it has none."""
         self._need(EXPERT, "expert", "add them, or teach with a robot that has one")
-        look_ahead, speed, gain, disturbance = (self.figures[name] for name in EXPERT)
-        return look_ahead, speed, gain, disturbance
+        return tuple(self.figures[name] for name in EXPERT)
 
     def wheel_distance(self) -> float:
-        """Distance between the wheels [m], by which a driving examination is scored.
-
-        Raises:
-            SettingsError: If the robot does not state it.
-        """
-        self._need(WHEELS, "stated wheel distance", "add it")
+        """Distance between the wheels [m], by which a driving examination is scored; refused if it is not stated."""
+        self._need(("wheel_distance",), "stated wheel distance", "add it")
         return self.figures["wheel_distance"]
 
     def _need(self, names: tuple[str, ...], part: str, otherwise: str) -> None:

@@ -41,11 +41,7 @@ TICKS, RATE_HZ = 8, 20.0
 
 @lru_cache
 def outside_effect(name: str, folder: Path | None) -> type[Effect]:
-    """The class of an effect that is not shipped: `module:Attribute`, or the name of a plug-in.
-
-    Raises:
-        ExtensionError: If there is none, or it is not what an effect must be.
-    """
+    """The class of an effect that is not shipped: `module:Attribute`, or a plug-in's name; refused if it is none."""
     kind = load(name, kind="effect", beside=folder, needs=MEMBERS)
     for problem in problems(kind):
         raise ExtensionError(f"effect '{name}' {problem}")
@@ -260,11 +256,7 @@ class Catalogue:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The effects to choose from: those shipped in the order in which the signal meets them, plug-ins, `own`.
-
-        Raises:
-            ExtensionError: If two plug-ins have one name, or one has that of a shipped effect.
-        """
+        """The effects to choose from: those shipped in the order in which the signal meets them, plug-ins, `own`."""
         known = {name for effects in DRIVES.values() for name in effects}
         return tuple(dict.fromkeys((*self.shipped, *plugins("effect", known), *self.own)))
 
@@ -274,11 +266,7 @@ class Catalogue:
         return Parameters(self)
 
     def effect(self, name: str) -> type[Effect]:
-        """The effect of this name.
-
-        Raises:
-            ExtensionError: If there is none, or it is not what an effect must be.
-        """
+        """The effect of this name; refused if there is none, or it is not what an effect must be."""
         return self.shipped[name] if name in self.shipped else outside_effect(name, self.folder)
 
     def theta_names(self, name: str) -> tuple[str, ...]:
@@ -292,11 +280,7 @@ class Catalogue:
 
 @dataclass(frozen=True)
 class Parameters(Mapping[str, Parameter]):
-    """The parameters of a catalogue by their names in θ; a user's own effects answer where they are asked for by name.
-
-    Raises:
-        ExtensionError: If an effect that is asked for cannot be used.
-    """
+    """The parameters of a catalogue by their names in θ; a user's own effects answer where asked for by name."""
 
     catalogue: Catalogue
 

@@ -89,15 +89,11 @@ class Lateness(NamedTuple):
 
 @dataclass(frozen=True)
 class Draws:
-    """Random draws of an effect of one parameter, one for each command.
+    """Random draws of an effect of one parameter, one for each command."""
 
-    Attributes:
-        lateness: From the parameter's value and the commands per second to how late commands are.
-        sizes: Least and greatest value that is looked for.
-    """
-
+    # from the parameter's value and the commands per second to how late commands are
     lateness: Callable[[float, float], Lateness]
-    sizes: tuple[float, float]
+    sizes: tuple[float, float]  # least and greatest value that is looked for
 
 
 @dataclass(frozen=True)

@@ -305,11 +305,7 @@ def learnt_effect(theta: Theta) -> Learnt | None:
 
 
 def read_learnt(section: Section) -> dict[str, float]:
-    """The values of the `[effects.learnt]` tables by their names in θ.
-
-    Raises:
-        SettingsError: With file, key and remedy.
-    """
+    """The values of the `[effects.learnt]` tables by their names in θ."""
     section.only((RANGE, *GROUPS))
     if not section.values:
         return {}

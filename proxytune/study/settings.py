@@ -195,11 +195,7 @@ class StudySettings:
 
     @property
     def target(self) -> Path:
-        """The score table of the target; of several files the first.
-
-        Raises:
-            SettingsError: If there is none.
-        """
+        """The score table of the target; of several files the first; refused if there is none."""
         if not self.targets:
             told = "is missing, so this is a bank, which `study` runs and learn_from names; name a table of scores"
             raise self.error("target", told)
@@ -232,11 +228,7 @@ class StudySettings:
         return Section(self.path, where, {}).error(key, problem)
 
     def check_single(self) -> None:
-        """Refuse a study of several families where one is needed.
-
-        Raises:
-            SettingsError: That says how to name one of them.
-        """
+        """Refuse a study of several families where one is needed, and say how to name one of them."""
         if self.families:
             one = self.home / FAMILIES / next(iter(self.families))
             raise self.error(FAMILIES, f"each of these is a study of its own, and one is needed; give one, as {one}")

@@ -228,10 +228,8 @@ class StudyRun:
         A failed episode counts as known where failures do not stop the study and the code that failed is still the
         same; else it is tried again, since something is expected to have been corrected. So is, once, one that an
         earlier run gave too little time. Where it is asked whether what is known of a domain instance is enough, agents
-        begin in their order, each in all instances, and none more begins in an instance after a yes.
-
-        Raises:
-            EpisodeError: If an episode fails and the study is to stop then.
+        begin in their order, each in all instances, and none more begins in an instance after a yes. An EpisodeError is
+        raised if one fails and the study is to stop then.
         """
         again = self.settings.stop_on_failure
         known = {e: o for e, o in self.known(planned).items() if not (o.failure and (again or e in self.corrected))}
@@ -309,11 +307,7 @@ class StudyRun:
             raise EpisodeError(f"{failure_of(failed[0])}; correct it and run again, or set on_failure = 'continue'")
 
     def evaluate(self, theta: Theta, what: str) -> Evaluation:
-        """Score a domain instance by every agent from every start.
-
-        Raises:
-            EpisodeError: If an episode fails and the study is to stop then.
-        """
+        """Score a domain instance by every agent from every start, unless one fails and the study is to stop then."""
         self.outcomes(plan_episodes(self.settings, theta, self.settings.seed), what)
         evaluation = self.evaluation(theta)
         assert evaluation is not None
@@ -331,15 +325,10 @@ class StudyRun:
         return self._evaluations[key]
 
     def evaluation_of(self, trial: TrialRecord) -> Evaluation:
-        """The score of a finished trial.
-
-        Raises:
-            RunError: If the store lacks some of its episodes.
-        """
-        evaluation = self.evaluation(trial.theta)
-        if evaluation is None:
-            raise self._lacks_episodes(trial)
-        return evaluation
+        """The score of a finished trial; refused if the store lacks some of its episodes."""
+        if evaluation := self.evaluation(trial.theta):
+            return evaluation
+        raise self._lacks_episodes(trial)
 
     def episodes_of(self, trial: TrialRecord) -> list[Episode]:
         """The episodes that a trial stands on: all, or those of the agents decided before it was pruned."""
@@ -362,10 +351,7 @@ class StudyRun:
     def search_trial(self, trial: TrialRecord) -> Trial:
         """A finished trial as the search sees it; of one that was pruned, the outputs of the agents driven until then.
 
-        Of these the store may happen to have more: other processes had begun them.
-
-        Raises:
-            RunError: If the store lacks episodes of it.
+        Of these the store may happen to have more: other processes had begun them. Refused if it lacks any.
         """
         if trial.number not in self._trials:
             planned = self.episodes_of(trial)

@@ -384,11 +384,7 @@ NEEDS = ("begin", "act")
 
 
 def load_agent(name: str, folder: Path) -> Agent:
-    """The agent of this name.
-
-    Args:
-        name: A key of AGENTS, a plug-in, or `module:attribute`: an agent, or what makes one when called.
-        folder: Where a user's modules lie besides the installed ones.
+    """The agent of this name: a key of AGENTS, a plug-in, or `module:attribute`, an agent or what makes one.
 
     Raises:
         ExtensionError: If there is no such agent.

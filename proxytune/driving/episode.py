@@ -90,6 +90,10 @@ class Course:
     ended: Callable[[float, float], bool]  # whether a robot at x, y [m] has left the course
 
 
+Sees = Callable[[Picture, Signal], Any]
+"""What a driver is shown of the newest picture and the true pose."""
+
+
 def picture_only(picture: Picture, pose: Signal) -> Picture:
     """All that an agent sees."""
     return picture

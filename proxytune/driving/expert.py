@@ -108,7 +108,8 @@ class Guide:
 
 def lesson_driver(road: Road, robot: Robot, seed: int, policy: Policy | None) -> Expert | Guide:
     """Who drives in a lesson: the robot's expert, or a policy that it guides."""
-    expert = Expert(road, *robot.expert_figures(), seed=seed)
+    look_ahead, speed, gain, disturbance = robot.expert_figures()
+    expert = Expert(road, look_ahead, speed, gain, disturbance, seed)
     return expert if policy is None else Guide(expert, policy)
 
 

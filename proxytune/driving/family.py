@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from proxytune.domain import Demonstration, Episode, Policy, Recording
-from proxytune.driving.agent import Agent, Picture
+from proxytune.driving.agent import Agent
 from proxytune.driving.agents import AGENTS, AtTheWheel, load_agent
 from proxytune.driving.bullet import BulletCamera, need_pybullet
 from proxytune.driving.cameras import GroundPlaneCamera
@@ -24,6 +24,7 @@ from proxytune.driving.episode import (
     Drive,
     Driver,
     Instance,
+    Sees,
     Sight,
     driving_score,
     measured,
@@ -266,7 +267,7 @@ class LaneFollowing:
         drivers: Sequence[Driver],
         seconds: float,
         *,
-        sees: Callable[[Picture, Signal], Any] = picture_only,
+        sees: Sees = picture_only,
         ended: Callable[[float, float], bool] | None = None,
     ) -> list[Drive | EpisodeError]:
         """Drive episodes side by side for some time [s], or until they have `ended`: off the map."""

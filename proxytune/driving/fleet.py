@@ -14,7 +14,6 @@ from typing import Any, ClassVar, Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from proxytune.driving.agent import Picture
 from proxytune.driving.bullet import BulletPlant
 from proxytune.driving.cameras import Views
 from proxytune.driving.episode import (
@@ -23,6 +22,7 @@ from proxytune.driving.episode import (
     Drive,
     Driver,
     Instance,
+    Sees,
     Shown,
     alike,
     ask_many,
@@ -252,7 +252,7 @@ def drive_fleet(
     fleet: Fleet,
     drivers: Sequence[Driver],
     courses: Sequence[Course],
-    sees: Callable[[Picture, Signal], Any] = picture_only,
+    sees: Sees = picture_only,
 ) -> list[Drive | EpisodeError]:
     """Drive robots side by side, each until the time is over, it crashes, its course ends or its driver fails.
 
@@ -260,8 +260,7 @@ def drive_fleet(
     true pose (an expert's is `Sight`). Gives each robot's drive, or an EpisodeError where its driver failed.
     """
     control_hz = instances[0].robot.figures["control_rate"]
-    drives = _Drives(Rollouts(instances, courses, fleet), drivers, sees)
-    drives.begin([instance.robot for instance in instances])
+    drives = _Drives(Rollouts(instances, courses, fleet), drivers, [instance.robot for instance in instances], sees)
     for step in range(drives.rollouts.steps):
         drives.ask(step / control_hz)
         if not drives.drivers:
@@ -273,21 +272,17 @@ def drive_fleet(
 class _Drives:
     """Drives under way, in the rows of the robots under way, and the `results` of those that ended."""
 
-    def __init__(self, rollouts: Rollouts, drivers: Sequence[Driver], sees: Callable[[Picture, Signal], Any]) -> None:
+    def __init__(self, rollouts: Rollouts, drivers: Sequence[Driver], robots: Sequence[Robot], sees: Sees) -> None:
         self.rollouts, self.drivers, self._sees = rollouts, alike(drivers), sees
         self.results: list[Any] = [None] * len(drivers)
         self._groups = grouped(self.drivers)
         self._by_picture = all(isinstance(driver, Pupil) for driver in drivers)
-        self._memories: list[Any] = []
+        self._memories, problems = begin_all(self.drivers, robots)
         self._shown: Shown | None = None
         self._commands = np.zeros((len(drivers), 2))
         self._issued = np.empty((len(drivers), rollouts.steps, 2))
         self._poses = np.empty((len(drivers), rollouts.steps * rollouts.hold + 1, 3))
         self._poses[:, 0] = rollouts.poses[:, 0]
-
-    def begin(self, robots: Sequence[Robot]) -> None:
-        """Give every driver the memory it begins with."""
-        self._memories, problems = begin_all(self.drivers, robots)
         self._fail(problems)
 
     def ask(self, time_s: float) -> None:
@@ -334,13 +329,7 @@ class _Drives:
         self._commands, self._shown = self._commands[rows], None
 
 
-def drive(
-    instance: Instance,
-    plant: Plant,
-    driver: Driver,
-    course: Course,
-    sees: Callable[[Picture, Signal], Any] = picture_only,
-) -> Drive:
+def drive(instance: Instance, plant: Plant, driver: Driver, course: Course, sees: Sees = picture_only) -> Drive:
     """Drive one robot as `drive_fleet` drives several.
 
     Raises:

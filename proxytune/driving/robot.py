@@ -70,25 +70,16 @@ WITHOUT_BODY = 'use plant = "planar"'
 
 @dataclass(frozen=True)
 class Robot:
-    """A robot's nominal figures and effects.
+    """A robot's nominal figures and effects."""
 
-    Attributes:
-        name: Name of its folder.
-        description: What it is, in one line.
-        figures: Those nominal figures that are known, by name, in the units of UNITS; those REQUIRED are among them.
-        theta: Values of the effects that every instance of it has.
-        urdf: Its body for the bullet plant, or None.
-        catalogue: The effects that it may have, and how it drives.
-        reverse: Whether it drives backwards too.
-    """
-
-    name: str
-    description: str
+    name: str  # name of its folder
+    description: str  # what it is, in one line
+    # those nominal figures that are known, by name, in the units of UNITS; those REQUIRED are among them
     figures: Mapping[str, float]
-    theta: Mapping[str, float]
-    urdf: Path | None
-    catalogue: Catalogue = SHIPPED
-    reverse: bool = True
+    theta: Mapping[str, float]  # values of the effects that every instance of it has
+    urdf: Path | None  # its body for the bullet plant, or None
+    catalogue: Catalogue = SHIPPED  # the effects that it may have, and how it drives
+    reverse: bool = True  # whether it drives backwards too
 
     @property
     def drive(self) -> str:
@@ -157,10 +148,6 @@ def robot_names(folder: Path | None = None) -> tuple[str, ...]:
 def robot_home(name: str, folder: Path | None = None) -> Path:
     """The folder of a robot: in the study's folder first, then beside it, then shipped, then what a plug-in names.
 
-    Args:
-        name: The folder's name, or that of a plug-in.
-        folder: The user's folder, that of a study.
-
     Raises:
         SettingsError: If there is no such robot.
         ExtensionError: If its plug-in cannot be used.
@@ -179,11 +166,7 @@ def robot_home(name: str, folder: Path | None = None) -> Path:
 
 @functools.lru_cache
 def read_robot(name: str, folder: Path | None = None) -> Robot:
-    """Read a robot by name.
-
-    Args:
-        name: Of its folder.
-        folder: A user's folder, where robots and modules of effects come before those shipped.
+    """Read a robot by its folder's name; robots and modules of effects in a user's folder come before shipped ones.
 
     Raises:
         SettingsError: If there is no such robot or its robot.toml is not complete.
@@ -205,10 +188,7 @@ def read_robot(name: str, folder: Path | None = None) -> Robot:
 def catalogue_of(robot: str, folder: Path | None, own: tuple[str, ...] = ()) -> Catalogue:
     """The effects that a robot of this name may have, or one on two wheels where none is known by it.
 
-    Args:
-        robot: Its name.
-        folder: A user's folder, where robots and modules of effects come before those shipped.
-        own: Effects that a diagnosis is to try beside.
+    A user's folder comes before what is shipped; `own` are effects that a diagnosis is to try beside.
     """
     known = robot in robot_names(folder)
     return replace(read_robot(robot, folder).catalogue if known else Catalogue(folder), folder=folder, own=own)
@@ -227,10 +207,7 @@ def read_model_of(path: Path, folder: Path | None) -> Model:
 def robot_from_geometry(name: str, geometry: Mapping[str, float], control_rate: float) -> Robot:
     """A robot without a folder, as its log describes it: it obeys at once and has no effects.
 
-    Args:
-        name: What the log calls it.
-        geometry: Its wheel_radius and effective_baseline [m] and full_speed [m/s].
-        control_rate: How often it is sent a command [Hz].
+    Its geometry is wheel_radius and effective_baseline [m] and full_speed [m/s], the rate that of its commands [Hz].
 
     Raises:
         SettingsError: If the log leaves one of them out.

@@ -197,12 +197,7 @@ DECLARED_OF_CARS: tuple[str, ...] = ("steering_offset", "delay", "blur", "camera
 
 
 def theta_names(effect: type[Effect], name: str = "") -> tuple[str, ...]:
-    """The names of an effect's parameters in θ: its own where it has one, `effect.parameter` where it has more.
-
-    Args:
-        effect: Its class.
-        name: What it is called in θ, if that is not its own name.
-    """
+    """The names in θ of an effect's parameters: its own or another name, with `.parameter` where there are several."""
     called = name or effect.name
     if len(effect.parameters) == 1:
         return (called,)

@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from enum import StrEnum
 from types import ModuleType
-from typing import Any, ClassVar, NamedTuple, Protocol, TypeVar, dataclass_transform, runtime_checkable
+from typing import Any, ClassVar, NamedTuple, Protocol, TypeVar, dataclass_transform
 
 import numpy as np
 from numpy.typing import NDArray
@@ -276,25 +276,9 @@ def effect(name: str, stage: Stage) -> Callable[[type[Kind]], type[Kind]]:
     return make
 
 
-@runtime_checkable
-class Separate(Protocol):
-    """An effect that does each sample by itself, so that those nobody looks at may be left out."""
-
-    def skip(self, memory: Memory, samples: int, /) -> Memory:
-        """The memory after so many more samples."""
-
-
 def skip_nothing(effect: object, memory: Any, samples: int) -> Any:
-    """The `skip` of an effect that does the same to each sample."""
+    """The `skip` of an effect that does the same to each sample: its memory after so many more."""
     return memory
-
-
-@runtime_checkable
-class Recalling(Protocol):
-    """An effect for which it matters what came before a window that begins amid a drive."""
-
-    def recall(self, context: FilterContext, signal: Signal, row: Signal, sample: Signal) -> Memory:
-        """The memory as of a sample (W,) of a row (W,) of longer signals (rows, time, channels)."""
 
 
 FEW = 8

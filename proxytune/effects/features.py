@@ -225,6 +225,10 @@ def _of_tracker(axis: int) -> Group:
     return Group(f"the tracker's {'xy'[axis]}", "m", channels)
 
 
+def _group(title: str, unit: str, low: float | None = None, **channels: Channel) -> Group:
+    return Group(title, unit, channels, low)
+
+
 HEADING, PLACE = "heading", "place"
 OF_PLACE = (PLACE, "x", "y", "tracker_x", "tracker_y")
 """The groups that look at where the robot points, and at where it is."""
@@ -235,85 +239,67 @@ MOTION_GROUPS: Mapping[str, Group] = MappingProxyType(
         "other_wheel": Group(
             "speed of the other wheel", "m/s", _of_wheels("m/s", lambda a, k, wheel: hats(a.wheels[1 - wheel], k))
         ),
-        "turn_rate": Group(
+        "turn_rate": _group(
             "turn rate",
             "rad/s",
-            {
-                "forward": Channel("forward", "of the speed", lambda a, k: hats(a.yaw, k, a.forward)),
-                "sideways": Channel("sideways", "of the speed", lambda a, k: hats(a.yaw, k, a.forward)),
-                "yaw": Channel("yaw", "rad/s", lambda a, k: hats(a.yaw, k)),
-            },
+            forward=Channel("forward", "of the speed", lambda a, k: hats(a.yaw, k, a.forward)),
+            sideways=Channel("sideways", "of the speed", lambda a, k: hats(a.yaw, k, a.forward)),
+            yaw=Channel("yaw", "rad/s", lambda a, k: hats(a.yaw, k)),
         ),
-        "speed_and_turn": Group(
+        "speed_and_turn": _group(
             "speed and turn rate together",
             "m/s, rad/s",
-            {
-                "forward": Channel("forward", "m/s", grid),
-                "sideways": Channel("sideways", "m/s", grid),
-                "yaw": Channel("yaw", "rad/s", grid),
-            },
+            forward=Channel("forward", "m/s", grid),
+            sideways=Channel("sideways", "m/s", grid),
+            yaw=Channel("yaw", "rad/s", grid),
         ),
-        "transients": Group(
+        "transients": _group(
             "changes of wheel speed",
             "s",
-            {
-                **_of_wheels("of the change", lambda a, k, wheel: a.bands[wheel]),
-                **_of_wheels("of the change", slowing, "_slowing"),
-                **_of_wheels("of the change", stopping, "_stopping"),
-                "sideways": Channel("sideways", "of the change", lambda a, k: a.bands.mean(axis=0)),
-                "veer": Channel("yaw", "rad/m", lambda a, k: a.bands.mean(axis=0)),
-            },
             1e-3,
+            **_of_wheels("of the change", lambda a, k, wheel: a.bands[wheel]),
+            **_of_wheels("of the change", slowing, "_slowing"),
+            **_of_wheels("of the change", stopping, "_stopping"),
+            sideways=Channel("sideways", "of the change", lambda a, k: a.bands.mean(axis=0)),
+            veer=Channel("yaw", "rad/m", lambda a, k: a.bands.mean(axis=0)),
         ),
-        "changes": Group(
+        "changes": _group(
             "changes of either wheel's speed, by speed and direction",
             "s",
-            {
-                **_of_wheels("s/m of the change", lambda a, k, wheel: a.bands[wheel] * fast(a, wheel), "_fast"),
-                **_of_wheels(
-                    "of the change", lambda a, k, wheel: a.bands[wheel] * (sign(a, wheel) < 0.0), "_backwards"
-                ),
-                **_of_wheels("of the change", lambda a, k, wheel: a.bands[1 - wheel], "_crossed"),
-            },
             1e-3,
+            **_of_wheels("s/m of the change", lambda a, k, wheel: a.bands[wheel] * fast(a, wheel), "_fast"),
+            **_of_wheels("of the change", lambda a, k, wheel: a.bands[wheel] * (sign(a, wheel) < 0.0), "_backwards"),
+            **_of_wheels("of the change", lambda a, k, wheel: a.bands[1 - wheel], "_crossed"),
         ),
-        "ringing": Group(
+        "ringing": _group(
             "swings after changes of wheel speed",
             "Hz",
-            {
-                **_of_wheels("of the change", lambda a, k, wheel: a.rings[wheel].real),
-                **_of_wheels("of the change", lambda a, k, wheel: a.rings[wheel].imag, "_later"),
-            },
             1e-3,
+            **_of_wheels("of the change", lambda a, k, wheel: a.rings[wheel].real),
+            **_of_wheels("of the change", lambda a, k, wheel: a.rings[wheel].imag, "_later"),
         ),
         "play": Group("way in which wheel speed changes", "m/s", _of_wheels("of the play", played), 1e-3),
-        "start": Group(
+        "start": _group(
             "time since it stood",
             "s",
-            {
-                **_of_wheels("of its speed", lambda a, k, wheel: a.wheels[wheel][..., None] * started(a, k, wheel)),
-                **_of_wheels("m/s", lambda a, k, wheel: sign(a, wheel) * started(a, k, wheel), "_push"),
-            },
             1e-3,
+            **_of_wheels("of its speed", lambda a, k, wheel: a.wheels[wheel][..., None] * started(a, k, wheel)),
+            **_of_wheels("m/s", lambda a, k, wheel: sign(a, wheel) * started(a, k, wheel), "_push"),
         ),
-        "reversal": Group(
+        "reversal": _group(
             "way since reversal",
             "m",
-            {
-                **_of_wheels("of its speed", after_reversal),
-                "forward": Channel("forward", "of the speed", body_after_reversal),
-                "veer": Channel("yaw", "rad/m", body_after_reversal),
-            },
             1e-3,
+            **_of_wheels("of its speed", after_reversal),
+            forward=Channel("forward", "of the speed", body_after_reversal),
+            veer=Channel("yaw", "rad/m", body_after_reversal),
         ),
-        "direction": Group(
+        "direction": _group(
             "direction of travel",
             "sign",
-            {
-                "forward": Channel("forward", "of the speed", lambda a, k: backwards(a, k) * a.forward[..., None]),
-                "yaw": Channel("yaw", "of the yaw rate", lambda a, k: backwards(a, k) * a.yaw[..., None]),
-                "veer": Channel("yaw", "rad/m", lambda a, k: backwards(a, k) * a.forward[..., None]),
-            },
+            forward=Channel("forward", "of the speed", lambda a, k: backwards(a, k) * a.forward[..., None]),
+            yaw=Channel("yaw", "of the yaw rate", lambda a, k: backwards(a, k) * a.yaw[..., None]),
+            veer=Channel("yaw", "rad/m", lambda a, k: backwards(a, k) * a.forward[..., None]),
         ),
         "time": Group(
             "time in the episode",
@@ -333,18 +319,16 @@ MOTION_GROUPS: Mapping[str, Group] = MappingProxyType(
             _of_wheels("of its speed", lambda a, k, wheel: a.loads * a.wheels[wheel][..., None]),
             1e-3,
         ),
-        HEADING: Group(
+        HEADING: _group(
             "heading",
             "turns a turn",
-            {
-                **_of_heading("forward", "forward", "m/s"),
-                **_of_heading("sideways", "sideways", "m/s"),
-                **_of_heading("veer", "yaw", "rad/m", lambda a: np.abs(a.forward)),
-                **_of_heading("ahead", "forward", "of the speed", lambda a: a.forward),
-                **_of_heading("aside", "sideways", "of the speed", lambda a: a.forward),
-                **_of_heading("yaw", "yaw", "of the yaw rate", lambda a: a.yaw),
-            },
             1.0,
+            **_of_heading("forward", "forward", "m/s"),
+            **_of_heading("sideways", "sideways", "m/s"),
+            **_of_heading("veer", "yaw", "rad/m", lambda a: np.abs(a.forward)),
+            **_of_heading("ahead", "forward", "of the speed", lambda a: a.forward),
+            **_of_heading("aside", "sideways", "of the speed", lambda a: a.forward),
+            **_of_heading("yaw", "yaw", "of the yaw rate", lambda a: a.yaw),
         ),
         PLACE: _of_place("m, m", slice(None)),
         "x": _of_place("m", slice(0, 1)),

@@ -5,12 +5,12 @@ import zlib
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import cast
+from typing import Any
 
 import numpy as np
 
 from proxytune.effects.catalogue import DRIVES, SHIPPED, Catalogue, effect_of, parameter_hint
-from proxytune.effects.effect import Effect, FilterContext, Memory, Recalling, Separate, Signal, Stage
+from proxytune.effects.effect import Effect, FilterContext, Memory, Signal, Stage
 from proxytune.effects.learnt import Learnt, is_learnt, learnt_text, read_learnt
 from proxytune.errors import ExtensionError
 from proxytune.settings import GEOMETRY, Section, nearest, read_settings
@@ -40,11 +40,7 @@ class Model:
 
 
 def read_model(path: Path, catalogue: Catalogue = SHIPPED) -> Model:
-    """Read a model.toml.
-
-    Args:
-        path: The file.
-        catalogue: The effects that it may name.
+    """Read a model.toml, which may name effects of a catalogue.
 
     Raises:
         SettingsError: With file, key and remedy.
@@ -160,9 +156,10 @@ class Chain:
         it.
         """
         memories = list(self.begin(context))
-        recalling = [number for number, effect in enumerate(self.effects) if isinstance(effect, Recalling)]
-        for number, effect in enumerate(self.effects[: max(recalling, default=-1) + 1]):
-            if isinstance(effect, Recalling):
+        recalling = [number for number, effect in enumerate(self.effects) if hasattr(effect, "recall")]
+        for number in range(max(recalling, default=-1) + 1):
+            effect: Any = self.effects[number]
+            if number in recalling:
                 memories[number] = effect.recall(context, signal, row, sample)
             signal, _ = effect.apply(signal, effect.begin(whole))
         return tuple(memories)
@@ -176,16 +173,16 @@ class Chain:
         return signal, tuple(after)
 
     def parted(self) -> tuple["Chain", "Chain"]:
-        """The effects that mix samples with those before, and the last ones, which do each sample by itself."""
+        """The effects that mix samples with those before, and the last ones, which can `skip` samples."""
         first = len(self.effects)
-        while first and isinstance(self.effects[first - 1], Separate):
+        while first and hasattr(self.effects[first - 1], "skip"):
             first -= 1
         return Chain(self.effects[:first]), Chain(self.effects[first:])
 
     def skip(self, memories: tuple[Memory, ...], samples: int) -> tuple[Memory, ...]:
         """The memories after samples that nobody looks at; all effects have to do each sample by itself."""
-        kept = zip(self.effects, memories, strict=True)
-        return tuple(cast(Separate, effect).skip(memory, samples) for effect, memory in kept)
+        kept: Any = zip(self.effects, memories, strict=True)
+        return tuple(effect.skip(memory, samples) for effect, memory in kept)
 
     def mean_weights(self, rate_hz: float) -> Signal | None:
         """The weights of the last samples, the newest last, if all that the effects make is a mean of these.

@@ -360,14 +360,10 @@ class PlayedEnvironment:
 def played_environment(
     given: Any, space: Space, policies: Mapping[str, Any], domain: Mapping[str, Any], path: Path
 ) -> PlayedEnvironment:
-    """The function that plays an environment's episodes.
+    """The function that plays episodes of an environment, given as a registered name or as what makes it.
 
-    Args:
-        given: A registered name, or what makes the environment.
-        space: What is tuned: effects by name, attributes with a point, else arguments of the constructor.
-        policies: Agents by name.
-        domain: Other keys of a `[domain]` table.
-        path: The file that complaints name.
+    In its space are effects by name, attributes with a point, else arguments of the constructor; `domain` has other
+    keys of a `[domain]` table, and complaints name the path.
 
     Raises:
         InputError: If the environment, a parameter or a policy cannot be used.

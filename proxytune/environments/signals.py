@@ -244,12 +244,8 @@ class EnvironmentParameters(Mapping[str, Parameter]):
         return sum(1 for _ in self)
 
     def _refusal(self, name: str, parameter: Parameter) -> str:
-        kind = self.catalogue.effect(name)
-        return (
-            _of_stage(kind, self.spaces)
-            or _of_wheels(name, kind, parameter, self.spaces)
-            or _of_needs(kind, self.spaces)
-        )
+        kind, spaces = self.catalogue.effect(name), self.spaces
+        return _of_stage(kind, spaces) or _of_wheels(name, kind, parameter, spaces) or _of_needs(kind, spaces)
 
 
 def _of_stage(kind: type[Effect], spaces: Spaces) -> str:

@@ -29,12 +29,7 @@ OF_THE_MACHINE = (errno.ENOSPC, errno.EDQUOT, errno.ENOMEM, errno.EMFILE, errno.
 
 
 def run_fleet(family: DomainFamily, episodes: Sequence[Episode], needed: Collection[str] = ()) -> list[Outcome]:
-    """Run episodes, side by side where the family can, and give each the outcome that it has by itself.
-
-    Args:
-        family: Where they run.
-        episodes: Which; a single one is run by itself.
-        needed: As of run_episode.
+    """Run episodes, side by side where the family can, and give each the outcome that `run_episode` gives it.
 
     Raises:
         RunError: As run_episode.
@@ -88,11 +83,7 @@ def run_episode(family: DomainFamily, episode: Episode, needed: Collection[str] 
     """Run one episode on one thread; what the agent or the domain does wrong is its outcome.
 
     What it draws from `random` and `numpy.random`, which belong to the whole process, follows from the episode's seed.
-
-    Args:
-        family: Where it runs.
-        episode: Which one.
-        needed: The metrics without which it has failed; others may be missing. All, where none is named.
+    Metrics that are not needed may be missing; where none is named, all are.
 
     Raises:
         RunError: If memory, disk or descriptors run out: that is not the episode's doing.
@@ -114,10 +105,7 @@ def run_episode(family: DomainFamily, episode: Episode, needed: Collection[str] 
 def check_machine(whose: str, problem: BaseException | None, remedy: str) -> None:
     """Refuse to call something failed of what memory, disk or descriptors lacked, whoever caught that first.
 
-    Args:
-        whose: What was under way, as the complaint begins.
-        problem: What was raised.
-        remedy: How to run again, as the complaint ends.
+    The complaint begins with what was under way, and ends with how to run again.
 
     Raises:
         RunError: With what the machine lacked.

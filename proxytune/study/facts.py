@@ -15,8 +15,8 @@ noted beside (NOTED) is no part of the comparison: no trial depends on it.
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from types import MappingProxyType
+from dataclasses import replace
+from types import MappingProxyType, SimpleNamespace
 from typing import Any, NoReturn, cast
 
 from proxytune.domain import DomainFamily
@@ -216,16 +216,6 @@ def _searches(store: Store) -> list[dict[str, Any]]:
     return known
 
 
-@dataclass(frozen=True)
-class DescribedFamily:
-    """A domain family as it had described itself when its study was run; it can drive nothing."""
-
-    identity: str
-    metrics: Mapping[str, str]
-    parameters: Mapping[str, Parameter]
-    starts: int
-
-
 def describe(study: Study, store: Store) -> None:
     """Keep what is needed to look at a study without its own code, if it has run any."""
     if str(study.settings.folder.resolve()) not in folders() and study.settings.family != GIVEN:
@@ -245,6 +235,7 @@ def describe(study: Study, store: Store) -> None:
 def _described(
     settings: StudySettings, store: Store, described: Mapping[str, Any]
 ) -> tuple[DomainFamily, Engine, Mapping[str, float] | None]:
+    """The domain family as it had described itself when its study was run, the engine, and the true θ."""
 
     def refuse(*_: Any) -> NoReturn:
         raise StoreError("a study that is only looked at proposes nothing")
@@ -255,7 +246,8 @@ def _described(
     }
     metrics = {str(name): str(unit) for name, unit in described["metrics"].items()}
     identity, starts = str(store.facts().get("identity", "")), int(described["starts"])
-    family = DescribedFamily(identity, metrics, MappingProxyType(parameters), starts)
+    # It can drive nothing.
+    family = SimpleNamespace(identity=identity, metrics=metrics, parameters=MappingProxyType(parameters), starts=starts)
     name, learns_from, truth = settings.engine, described["learns_from"], described["truth"]
     engine = engine_of(name) if name in ENGINE_NAMES else Engine(name, name, "", refuse, learns_from)
     return cast(DomainFamily, family), engine, dict(truth) if truth is not None else None

@@ -5,7 +5,7 @@
 """
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -119,32 +119,28 @@ class ComparedFamilies:
     @property
     def cheapest(self) -> BestFamilies:
         """The one whose episodes take the shortest."""
-        best = min(self.families, key=lambda one: float(np.mean(one.episode_seconds))).name
+        best = min(self._costs, key=lambda name: self._costs[name][0])
         alike = [name for name, (_, low, _) in self.times_cheapest(best).items() if name != best and low <= 1.0]
         return BestFamilies(best, tuple(alike))
 
     def seconds_per_episode(self) -> dict[str, tuple[float, float, float]]:
         """Mean seconds of an episode of each family, and the ends of its 95 % interval."""
-        return {one.name: (float(np.mean(one.episode_seconds)), *interval(means)) for one, means in self._resampled()}
+        return {name: (mean, *interval(drawn)) for name, (mean, drawn) in self._costs.items()}
 
     def times_cheapest(self, cheapest: str) -> dict[str, tuple[float, float, float]]:
         """The ratio of each one's mean seconds of an episode to this family's, with 95 % intervals, paired."""
-        base, resampled = next((one, means) for one, means in self._resampled() if one.name == cheapest)
-        shortest = float(np.mean(base.episode_seconds))
-        return {
-            one.name: (float(np.mean(one.episode_seconds)) / shortest, *interval(means / resampled))
-            for one, means in self._resampled()
-        }
+        shortest, resampled = self._costs[cheapest]
+        return {name: (mean / shortest, *interval(drawn / resampled)) for name, (mean, drawn) in self._costs.items()}
 
-    def _resampled(self) -> list[tuple[TunedFamily, Floats]]:
-        """Each family with the means of its episodes' seconds when episodes are drawn, alike in all."""
-
-        def means(seconds: Sequence[float]) -> Floats:
-            count = len(seconds)
+    @cached_property
+    def _costs(self) -> dict[str, tuple[float, Floats]]:
+        """The mean of each family's episodes' seconds, and such means when episodes are drawn, alike in all."""
+        costs = {}
+        for one in self.families:
+            count, seconds = len(one.episode_seconds), np.array(one.episode_seconds)
             drawn = np.random.default_rng(0).multinomial(count, np.full(count, 1 / count), size=RESAMPLES)
-            return np.asarray(drawn @ np.array(seconds) / count)
-
-        return [(one, means(one.episode_seconds)) for one in self.families]
+            costs[one.name] = float(seconds.mean()), np.asarray(drawn @ seconds / count)
+        return costs
 
 
 def tuned_family(run: StudyRun, result: StudyResult) -> TunedFamily:

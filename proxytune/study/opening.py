@@ -226,9 +226,6 @@ def open_bank(settings: StudySettings) -> Study:
         InputError: If anything in it cannot be used.
     """
     family = load_family(settings, settings.proxy)
-    for metric in settings.metrics:
-        if metric.name not in family.metrics:
-            raise settings.error("metrics", f"unknown metric '{metric.name}'; {nearest(metric.name, family.metrics)}")
     names = dict.fromkeys((*(metric.name for metric in settings.metrics), *family.metrics))
     table = ScoreTable.from_episodes(
         {(agent, start): dict.fromkeys(names, 0.0) for agent in settings.agents for start in range(settings.starts)}

@@ -216,9 +216,8 @@ def ask(driver: Driver, seen: Any, memory: Any, time_s: float) -> tuple[Command,
 def check_command(command: Command, time_s: float) -> None:
     """Refuse what are not two finite duties, with the time [s]."""
     if command.shape != (2,):
-        raise EpisodeError(
-            f"answered with shape {command.shape} at {time_s:.2f} s; a command is two duties, left and right"
-        )
+        told = f"answered with shape {command.shape} at {time_s:.2f} s"
+        raise EpisodeError(f"{told}; a command is two duties, left and right")
     if not (math.isfinite(command[0]) and math.isfinite(command[1])):
         raise EpisodeError(f"answered {command.tolist()} at {time_s:.2f} s; duties must be finite")
 

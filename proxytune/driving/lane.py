@@ -228,9 +228,8 @@ def lane_point(road: Road, counter_clockwise: Flags | bool, along: Floats | floa
     """
     layout, offset = lay_out(road.begin, road.segments), _offset(road, counter_clockwise)
     part = len(layout.side) // layout.repeats
-    repeat, past = np.divmod(
-        np.where(counter_clockwise, along, -np.asarray(along)), _way_to_end(layout, part - 1, offset)
-    )
+    way = np.where(counter_clockwise, along, -np.asarray(along))
+    repeat, past = np.divmod(way, _way_to_end(layout, part - 1, offset))
     section = np.sum([past >= _way_to_end(layout, number, offset) for number in range(part - 1)], axis=0, dtype=int)
     past = past - way_round(layout, section, layout.first[section], np.zeros(()), offset)
     radius, straight = bend_radius(layout, section, offset), layout.last[section] - layout.first[section]

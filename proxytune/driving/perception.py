@@ -159,11 +159,10 @@ def lower_part(rows: int, columns: int, share: float) -> Lower:
     """The part of a picture below a share of its height."""
     first = int(share * rows)
     side = np.repeat(np.linspace(-1.0, 1.0, columns)[None, :], rows - first, axis=0)
-    yellow, white = np.where(side > -0.35, 60, 255), np.where(side >= 0.35, 150, 255)
+    levels = np.where(side > -0.35, 60, 255), np.where(side >= 0.35, 150, 255)
+    yellow, white = (level.astype(np.uint8).ravel() for level in levels)
     pull = np.sign(side) * (1.0 - np.abs(side))
-    return Lower(
-        first, first * columns, yellow.astype(np.uint8).ravel(), white.astype(np.uint8).ravel(), pull[:, 1:].copy()
-    )
+    return Lower(first, first * columns, yellow, white, pull[:, 1:].copy())
 
 
 def weigh_markings(seen: Seen, looks: tuple[Lower, ...], robots: Sequence[int]) -> list[tuple[float, float]]:

@@ -134,9 +134,8 @@ class Robot:
     def _need(self, names: tuple[str, ...], part: str, otherwise: str) -> None:
         missing = [name for name in names if name not in self.figures]
         if missing:
-            raise SettingsError(
-                f"robot '{self.name}' has no {part}: its robot.toml states no {', '.join(missing)}; {otherwise}"
-            )
+            lacks = f"its robot.toml states no {', '.join(missing)}"
+            raise SettingsError(f"robot '{self.name}' has no {part}: {lacks}; {otherwise}")
 
 
 def robot_names(folder: Path | None = None) -> tuple[str, ...]:

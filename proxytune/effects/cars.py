@@ -294,9 +294,8 @@ def on_column(
     begin.__doc__, apply.__doc__ = "Begin as two wheels that are alike.", "Filter the column, and leave the other."
     body = {"name": name, "stage": wheels.stage, "parameters": own, "trace": _trace(wheels.trace, column)}
     title = "".join(part.title() for part in name.split("_")) + ("OfCar" if column == THROTTLE else "")
-    kind = make_dataclass(
-        title, [(one.name, float) for one in own], namespace={**body, "begin": begin, "apply": apply}, frozen=True
-    )
+    fields = [(one.name, float) for one in own]
+    kind = make_dataclass(title, fields, namespace={**body, "begin": begin, "apply": apply}, frozen=True)
     kind.__doc__, kind.__module__ = does or wheels.__doc__, __name__
     return cast(type[Effect], kind)
 

@@ -351,6 +351,5 @@ def _check(name: str, value: float, catalogue: Catalogue) -> None:
         raise SettingsError(f"{name}: no effect has this parameter; {parameter_hint(name, parameters)}")
     parameter = parameters[name]
     if not parameter.low <= value <= parameter.high:
-        raise SettingsError(
-            f"{name}: must be between {parameter.low:g} and {parameter.high:g} {parameter.unit}, got {value}"
-        )
+        bounds = f"{parameter.low:g} and {parameter.high:g} {parameter.unit}"
+        raise SettingsError(f"{name}: must be between {bounds}, got {value}")

@@ -149,9 +149,11 @@ def body_after_reversal(asked: AskedMotion, knots: Knots) -> Signal:
     return np.asarray(asked.forward[..., None] * np.exp(-np.abs(asked.rolled[2])[..., None] / np.asarray(knots)))
 
 
-def waves(
-    wave: Callable[[Signal], Signal], share_of: Callable[[AskedMotion], Signal] | None = None
-) -> Callable[[AskedMotion, Knots], Signal]:
+Part = Callable[[AskedMotion], Signal]
+"""A signal of the motion that is asked for."""
+
+
+def waves(wave: Callable[[Signal], Signal], share_of: Part | None = None) -> Callable[[AskedMotion, Knots], Signal]:
     """Harmonics of the heading while the robot moves, as shares of something or as they are."""
 
     def basis(asked: AskedMotion, knots: Knots) -> Signal:
@@ -195,9 +197,7 @@ def _of_wheels(unit: str, basis: Callable[[AskedMotion, Knots, int], Signal], en
     }
 
 
-def _of_heading(
-    name: str, to: str, unit: str, share_of: Callable[[AskedMotion], Signal] | None = None
-) -> dict[str, Channel]:
+def _of_heading(name: str, to: str, unit: str, share_of: Part | None = None) -> dict[str, Channel]:
     """A channel of cosines and one of sines."""
     return {f"{name}_{wave.__name__}": Channel(to, unit, waves(wave, share_of)) for wave in (np.cos, np.sin)}
 

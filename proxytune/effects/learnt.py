@@ -163,9 +163,8 @@ class Learnt:
         def before(values: Signal) -> Signal:
             return np.where((sample > 0).reshape(-1, *[1] * (values.ndim - 2)), values[row, sample - 1], 0.0)
 
-        slow = [
-            wheel[..., None] - np.cumsum(band, axis=-1) for wheel, band in zip(asked.wheels, asked.bands, strict=True)
-        ]
+        pairs = zip(asked.wheels, asked.bands, strict=True)
+        slow = [wheel[..., None] - np.cumsum(band, axis=-1) for wheel, band in pairs]
         return self.begin(context)._replace(
             seconds=sample / context.rate_hz,
             use=before(asked.use),
@@ -235,10 +234,9 @@ class Learnt:
         ringing = rings(change, past.ring, self._constants("ringing"), past.rate_hz)
         played = play(wheels, past.dragged, self._constants("play"))
         after = past._replace(seconds=seconds[..., -1], use=use[..., -1], slow=slow[..., -1, :], load=load[..., -1, :])
+        nowhere = (np.zeros_like(yaw), np.zeros((*yaw.shape, 2)))
         of_wheels = (bands, load, rolled, started, ringing, played)
-        asked = AskedMotion(
-            forward, yaw, wheels, seconds, use, np.zeros_like(yaw), np.zeros((*yaw.shape, 2)), *of_wheels
-        )
+        asked = AskedMotion(forward, yaw, wheels, seconds, use, *nowhere, *of_wheels)
         after = after._replace(rolled=rolled[..., -1], started=started[..., -1], last=wheels[..., -1])
         return asked, after._replace(ring=ringing[..., -1, :], dragged=played[..., -1, :])
 
@@ -396,10 +394,8 @@ def learnt_text(theta: Theta) -> str:
     if effect is None:
         return ""
     lines = [f"\n# {LABEL}", f"[effects.{Learnt.name}.{RANGE}]"]
-    lines += [
-        f"{channel} = [{low!r}, {high!r}]"
-        for channel, (low, high) in zip(FittedRange._fields, effect.seen, strict=True)
-    ]
+    ranges = zip(FittedRange._fields, effect.seen, strict=True)
+    lines += [f"{channel} = [{low!r}, {high!r}]" for channel, (low, high) in ranges]
     for group in dict.fromkeys(curve.group for curve in effect.curves):
         curves = [curve for curve in effect.curves if curve.group == group]
         lines += [

@@ -142,10 +142,8 @@ class Chain:
 
     def begin(self, context: FilterContext) -> tuple[Memory, ...]:
         """Every effect's memory, each with a seed of its own."""
-        return tuple(
-            effect.begin(replace(context, seed=zlib.crc32(effect.name.encode(), context.seed)))
-            for effect in self.effects
-        )
+        seeds = (zlib.crc32(effect.name.encode(), context.seed) for effect in self.effects)
+        return tuple(one.begin(replace(context, seed=seed)) for one, seed in zip(self.effects, seeds, strict=True))
 
     def begin_amid(
         self, context: FilterContext, whole: FilterContext, signal: Signal, row: Signal, sample: Signal

@@ -106,9 +106,8 @@ def _read_parameter(tables: Section, name: str) -> OwnParameter:
     if low >= high:
         raise table.error("low", f"must be below high, got {low:g} and {high:g}")
     neutral = table.number("neutral", low=low, high=high)
-    return OwnParameter(
-        Parameter(name=name, unit=table.text("unit", ""), low=low, high=high, neutral=neutral), argument, attribute
-    )
+    parameter = Parameter(name=name, unit=table.text("unit", ""), low=low, high=high, neutral=neutral)
+    return OwnParameter(parameter, argument, attribute)
 
 
 def _read_metrics(section: Section) -> tuple[EpisodeMetric, ...]:

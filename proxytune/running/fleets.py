@@ -112,10 +112,8 @@ def check_machine(whose: str, problem: BaseException | None, remedy: str) -> Non
     """
     while problem is not None:
         if isinstance(problem, MemoryError) or getattr(problem, "errno", None) in OF_THE_MACHINE:
-            where = place_of(problem)
-            raise RunError(
-                f"{whose}: the machine failed ({describe(problem)}){where}; run again to continue, {remedy}"
-            ) from None
+            failed = f"the machine failed ({describe(problem)}){place_of(problem)}"
+            raise RunError(f"{whose}: {failed}; run again to continue, {remedy}") from None
         problem = problem.__cause__ or problem.__context__
 
 

@@ -120,9 +120,8 @@ class Lines:
 
     def put(self, line: str) -> None:
         """Write one line on a terminal too, above its bar."""
-        self.console.print(
-            f"{time.monotonic() - self._began:.0f} s: {line}", highlight=False, markup=False, soft_wrap=True
-        )
+        told = f"{time.monotonic() - self._began:.0f} s: {line}"
+        self.console.print(told, highlight=False, markup=False, soft_wrap=True)
 
 
 def progress_bar(

@@ -297,9 +297,8 @@ def _mean_information(several: Sequence[Information]) -> Information:
 
     limits = [one.limit for one in several]
     agents, metrics = mean([one.agents for one in several]), mean([one.metrics for one in several])
-    return Information(
-        several[0].name, agents, metrics, "trials" if 2 * limits.count("trials") > len(limits) else "starts"
-    )
+    limit: Limit = "trials" if 2 * limits.count("trials") > len(limits) else "starts"
+    return Information(several[0].name, agents, metrics, limit)
 
 
 def learn_theta(space: Space, trials: Sequence[Trial], goal: Goal, seed: int = 0) -> Knowledge:
@@ -343,15 +342,8 @@ def importances(surrogate: Surrogate) -> tuple[Importance, ...]:
         share, alone = _indices(surrogate.mean(_points(len(names), POINTS)).reshape(2 + len(names), -1))
         drawn = _draws(surrogate, _points(len(names), DRAWN_POINTS)).reshape(DRAWS, 2 + len(names), -1)
     low, high = np.quantile(_indices(drawn)[0], LEVELS, axis=0)
-    return tuple(
-        Importance(
-            name=name,
-            share=float(share[column]),
-            interval=(float(min(low[column], share[column])), float(max(high[column], share[column]))),
-            alone=float(alone[column]),
-        )
-        for column, name in enumerate(names)
-    )
+    ends = zip(np.minimum(low, share).tolist(), np.maximum(high, share).tolist(), strict=True)
+    return tuple(map(Importance, names, share.tolist(), ends, alone.tolist()))
 
 
 def _points(dimensions: int, most: int) -> Floats:

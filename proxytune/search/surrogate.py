@@ -166,9 +166,8 @@ class GaussianProcess:
     def propose(self, space: Space, trials: Sequence[Trial], seed: int) -> Values:
         """The next point, a function of the set of trials and the seed alone; never a point visited or pending."""
         with threadpool_limits(limits=1):
-            return from_unit(
-                space, _most_promising(_fit_with_pending(space, trials), proposal_seed(seed, len(trials)))[0]
-            )
+            surrogate = _fit_with_pending(space, trials)
+            return from_unit(space, _most_promising(surrogate, proposal_seed(seed, len(trials)))[0])
 
 
 def expected_improvement(space: Space, trials: Sequence[Trial], seed: int) -> tuple[float, float]:

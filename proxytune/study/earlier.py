@@ -161,10 +161,8 @@ def _copied(run: StudyRun, key: str) -> list[Trial]:
     except (KeyError, TypeError, ValueError, AttributeError):
         raise StoreError(f"{run.store.path}: '{fact}' is not as proxytune writes it; restore a copy") from None
     values = np.concatenate([values, np.full((*shape[:2], 1), np.nan)], axis=2)[:, rows][:, :, metrics]
-    outputs = values.reshape(len(values), -1).tolist()
-    return [
-        Trial(theta, None, tuple(row), placement=place) for (place, theta), row in zip(placed, outputs, strict=True)
-    ]
+    pairs = zip(placed, values.reshape(len(values), -1).tolist(), strict=True)
+    return [Trial(theta, None, tuple(row), placement=place) for (place, theta), row in pairs]
 
 
 def read_source(settings: StudySettings, name: str, key: str = FULL) -> Source:

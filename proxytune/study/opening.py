@@ -150,9 +150,8 @@ def measure_of(name: str, beside: Path | None = None) -> Measure:
 
 def _as_objective(name: str, measure: Measure) -> Objective:
     if measure.on_means is None or measure.per_metric:
-        raise ExtensionError(
-            f"measure '{name}' is no single number of mean scores: it needs on_means, without per_metric"
-        )
+        told = f"measure '{name}' is no single number of mean scores"
+        raise ExtensionError(f"{told}: it needs on_means, without per_metric")
     of_means = measure.on_means
     if measure not in MEASURES:
         of_means = functools.partial(_of_users_measure, name, measure.on_means)

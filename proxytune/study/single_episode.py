@@ -186,6 +186,5 @@ def check_robot(family: DomainFamily, model: Path, option: str) -> None:
     robot = getattr(family, "robot", None)
     stated = read_settings(model).values.get("robot", robot)
     if robot is not None and stated != robot:
-        raise InputError(
-            f"{option} {model}: is of the robot '{stated}'; give a model of '{robot}', which the study drives"
-        )
+        other = f"is of the robot '{stated}'; give a model of '{robot}', which the study drives"
+        raise InputError(f"{option} {model}: {other}")

@@ -383,9 +383,8 @@ def with_spending(study: Study, *, budget: int | None = None, jobs: int | None =
             raise InputError(f"{name} must be between {least} and {most}, got {value}")
     settings = study.settings
     if budget is not None and settings.objective == LEARNING:
-        raise settings.error(
-            "budget", f"a search for '{LEARNING}' has its own; set teaching.budget in this file instead"
-        )
+        told = f"a search for '{LEARNING}' has its own; set teaching.budget in this file instead"
+        raise settings.error("budget", told)
     spending = replace(settings, budget=settings.budget if budget is None else budget, jobs=jobs or settings.jobs)
     return replace(study, settings=spending)
 

@@ -24,10 +24,7 @@ class GroundPlaneCamera:
     """The default camera: the robot drives flat, so where each pixel looks in its frame is known beforehand.
 
     A pixel looks up one point in that of several blurred copies of the floor's picture whose blur is as wide as what
-    the pixel covers there; without that, small pictures of a sharp floor alias.
-
-    Attributes:
-        shape: Of its pictures: rows, columns, 3.
+    the pixel covers there; without that, small pictures of a sharp floor alias. Its pictures have a `shape`.
     """
 
     def __init__(self, figures: CameraFigures, floor: Floor) -> None:

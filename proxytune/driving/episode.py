@@ -74,10 +74,8 @@ class Drive(NamedTuple):
         control_hz = robot.figures["control_rate"]
         poses = dict(zip(("x", "y", "heading"), self.poses.T, strict=True))
         commands = dict(zip(robot.columns, self.commands.T, strict=True))
-        return (
-            {"time": np.arange(len(self.poses)) / TICK_HZ, **poses},
-            {"time": np.arange(len(self.commands)) / control_hz, **commands},
-        )
+        posed, issued = np.arange(len(self.poses)) / TICK_HZ, np.arange(len(self.commands)) / control_hz
+        return {"time": posed, **poses}, {"time": issued, **commands}
 
 
 @dataclass(frozen=True)

@@ -108,8 +108,7 @@ class Guide:
 
 def lesson_driver(road: Road, robot: Robot, seed: int, policy: Policy | None) -> Expert | Guide:
     """Who drives in a lesson: the robot's expert, or a policy that it guides."""
-    look_ahead, speed, gain, disturbance = robot.expert_figures()
-    expert = Expert(road, look_ahead, speed, gain, disturbance, seed)
+    expert = Expert(road, *robot.expert_figures(), seed=seed)
     return expert if policy is None else Guide(expert, policy)
 
 

@@ -170,15 +170,9 @@ def _side_by_side(train: Drivetrain, seeds: tuple[int, ...], left: set[int]) -> 
 class Rollouts:
     """Episodes under way side by side, one control step after the other, all for the same time.
 
-    Attributes:
-        steps: How many commands there is time for.
-        hold: How many ticks each is held for.
-        under_way: The robots that are still driven, by their numbers.
-        here: The same as an index of arrays over all robots.
-        new_pictures: Whether they have new pictures since the last step.
-        poses: Theirs after each tick of the last step, (robots under way, ticks, 3): x [m], y [m], heading [rad];
-            before the first, the starts.
-        crashed: Whether each of them has hit something or fallen over.
+    There is time for so many `steps`; each command is held for `hold` ticks. The robots still driven are `under_way`,
+    and `here` in arrays over all. Their `poses` (robots, ticks, 3) are those after each tick of the last step,
+    before the first the starts; whether each has `crashed` then, or all have `new_pictures`, is told too.
     """
 
     def __init__(

@@ -68,9 +68,8 @@ class Drivetrain:
     def begin(self, context: FilterContext) -> DrivetrainState:
         """Begin as if the resting command of `context` had been given for ever."""
         still = np.zeros((*np.shape(context.rest)[:-1], len(CHANNELS[Stage.MOTION])))
-        return DrivetrainState(
-            self.command.begin(context), self.actuation.begin(context), self.motion.begin(replace(context, rest=still))
-        )
+        motion = self.motion.begin(replace(context, rest=still))
+        return DrivetrainState(self.command.begin(context), self.actuation.begin(context), motion)
 
     def apply(self, signal: Signal, memory: DrivetrainState) -> tuple[Signal, DrivetrainState]:
         """The twists that the next chunk of duties leads to."""

@@ -121,10 +121,11 @@ class Robot:
             k1=0.0,
         )
 
-    def expert_figures(self) -> tuple[float, ...]:
+    def expert_figures(self) -> tuple[float, float, float, float]:
         """Look-ahead [m], speed [m/s], gain and disturbance [duty] of the robot's expert; refused if it has none."""
         self._need(EXPERT, "expert", "add them, or teach with a robot that has one")
-        return tuple(self.figures[name] for name in EXPERT)
+        look_ahead, speed, gain, disturbance = (self.figures[name] for name in EXPERT)
+        return look_ahead, speed, gain, disturbance
 
     def wheel_distance(self) -> float:
         """Distance between the wheels [m], by which a driving examination is scored; refused if it is not stated."""
@@ -213,10 +214,8 @@ def robot_from_geometry(name: str, geometry: Mapping[str, float], control_rate: 
     """
     missing = [figure for figure in ("wheel_radius", "effective_baseline", "full_speed") if figure not in geometry]
     if missing:
-        raise SettingsError(
-            f"robot '{name}' is unknown and its log states no {', '.join(missing)}; "
-            "add wheel_radius_m, baseline_m and full_speed_m_s to log.toml"
-        )
+        remedy = "add wheel_radius_m, baseline_m and full_speed_m_s to log.toml"
+        raise SettingsError(f"robot '{name}' is unknown and its log states no {', '.join(missing)}; {remedy}")
     figures = {**geometry, "motor_time_constant": 0.0, "control_rate": control_rate}
     return Robot(name, "as its log describes it", MappingProxyType(figures), MappingProxyType({}), None)
 

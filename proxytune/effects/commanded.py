@@ -124,9 +124,8 @@ class LearntCommands:
         """The resting command has been given for ever."""
         rest = np.asarray(context.rest, dtype=float)
         long, begun = np.full(rest.shape, LONG_S), np.where(np.abs(rest) < STILL, 0.0, LONG_S)
-        dragged, slow, ramped = (
-            np.repeat(rest[..., None], len(self._knots(name)), axis=-1) for name in ("dragged", "ended", "ramped")
-        )
+        knots = map(self._knots, ("dragged", "ended", "ramped"))
+        dragged, slow, ramped = (np.repeat(rest[..., None], len(own), axis=-1) for own in knots)
         return CommandState(Commands(rest, long, begun, long, dragged, slow, ramped), np.sign(rest), context.rate_hz)
 
     def apply(self, signal: Signal, memory: CommandState) -> tuple[Signal, CommandState]:

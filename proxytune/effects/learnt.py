@@ -145,9 +145,8 @@ class Learnt:
             )
             out.append(moved[..., here, :] + self._added(now, memory.baseline, of_pose=True))
             _, bearing = reckon(out[-1][..., 2], bearing)
-            spot = spot._replace(
-                next=spot.next + step, pose=pose_after(poses[..., -1, :], out[-1][..., -1, :] / memory.rate_hz)
-            )
+            last = pose_after(poses[..., -1, :], out[-1][..., -1, :] / memory.rate_hz)
+            spot = spot._replace(next=spot.next + step, pose=last)
         return np.concatenate(out, axis=-2), bearing, spot
 
     @property
@@ -353,9 +352,8 @@ def _checked(seen: FittedRange, curves: list[LearntCurve], problem: Callable[[st
     """The effect, if its values make one."""
     for channel, (low, high) in zip(FittedRange._fields, seen, strict=True):
         if not (math.isfinite(low) and math.isfinite(high) and low <= 0.0 <= high):
-            raise problem(
-                f"{RANGE}.{channel}", f"must be finite with 0 in it, got [{low:g}, {high:g}]; state what was seen"
-            )
+            told = f"must be finite with 0 in it, got [{low:g}, {high:g}]; state what was seen"
+            raise problem(f"{RANGE}.{channel}", told)
     for curve in curves:
         where, group = f"{curve.group}.{curve.channel}", GROUPS[curve.group]
         _check_knots(curve, f"{curve.group}.knots", group, problem)

@@ -11,7 +11,7 @@ import sys
 import threading
 import time
 from collections import Counter, deque
-from collections.abc import Callable, Generator, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import CancelledError, Future
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ from uuid import uuid4
 
 from proxytune.errors import ExtensionError, InputError, RunError, to_install
 from proxytune.running.sending import OtherCodeError, Recipe, check_code, do_sent, made_by
-from proxytune.running.workers import LOST, START_S, AwakeClock, elsewhere
+from proxytune.running.workers import LOST, START_S, AwakeClock, Numbered, NumberedResults, elsewhere
 
 CONNECT_S, JOINED_S = 10.0, 30.0
 """So long it is waited for a connection, and for the first worker [s]."""
@@ -95,7 +95,7 @@ class _Held:
 class _Pieces:
     """The pieces to do, in their order; those that come back are handed out first."""
 
-    def __init__(self, numbered: Iterator[tuple[int, Any]]) -> None:
+    def __init__(self, numbered: Iterator[Numbered]) -> None:
         self._left, self._open, self._back = numbered, dict[int, Any](), deque[int]()
         self._deaths = Counter[int]()
 
@@ -111,7 +111,7 @@ class _Pieces:
             self._back.append(number)
             return
 
-    def next(self) -> tuple[int, Any] | None:
+    def next(self) -> Numbered | None:
         """A piece to hand out; None if there is none."""
         if not self._back:
             self._begin()
@@ -295,9 +295,7 @@ class Cluster:
         result.add_done_callback(lambda _: self._woken.set())
         return result
 
-    def results(
-        self, recipe: Recipe, numbered: Iterator[tuple[int, Any]], timeout_s: float | None
-    ) -> Generator[tuple[int, Any], None, None]:
+    def results(self, recipe: Recipe, numbered: Iterator[Numbered], timeout_s: float | None) -> NumberedResults:
         """Do numbered pieces; LOST stands for the result of one that ended several workers, or takes too long."""
         pieces, held, patience = _Pieces(numbered), dict[Key, _Held](), _Patience(self._say)
         try:

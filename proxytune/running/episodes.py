@@ -158,10 +158,8 @@ def _lost(watch: Watch, episode: Episode, end: WorkerExit) -> Outcome:
     """The outcome of an episode that has ended its process, or was ended."""
     where = f"agent '{episode.agent}' from start {episode.start}"
     if end.killed:
-        raise RunError(
-            f"{where}: its process was killed twice ({end.how}; out of memory?); run again to continue, with more "
-            "memory or without that agent"
-        )
+        remedy = "run again to continue, with more memory or without that agent"
+        raise RunError(f"{where}: its process was killed twice ({end.how}; out of memory?); {remedy}")
     failure = f"{ENDED} twice ({end.how})" if end.how else f"{ENDLESS} {watch.timeout_s:g} s"
     return Outcome(episode, None, failure, end.seconds)
 

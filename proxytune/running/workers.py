@@ -75,6 +75,11 @@ LOST: Any = object()
 """Stands for the result of a piece that has none: it took too long, or ended processes."""
 
 
+Numbered = tuple[int, Any]
+"""A piece, or its result, with the piece's number."""
+NumberedResults = Generator[Numbered, None, None]
+
+
 class Place(Protocol):
     """Where pieces are done instead of in processes of this machine."""
 
@@ -84,9 +89,7 @@ class Place(Protocol):
     def cores(self) -> int:
         """The number of pieces that are done at once there, asked whenever there are pieces to do."""
 
-    def results(
-        self, recipe: Recipe, numbered: Iterator[tuple[int, Any]], timeout_s: float | None
-    ) -> Generator[tuple[int, Any], None, None]:
+    def results(self, recipe: Recipe, numbered: Iterator[Numbered], timeout_s: float | None) -> NumberedResults:
         """Do numbered pieces, each asked for when it can begin; LOST stands for the result of one that is given up."""
 
 
@@ -191,10 +194,8 @@ def working(
 
 
 def _no_rescue(piece: Any, end: WorkerExit) -> Any:
-    raise RunError(
-        f"a process was killed twice by the same piece of work ({end.how}; out of memory?); run again to continue, "
-        "perhaps with jobs = 1"
-    )
+    told = f"a process was killed twice by the same piece of work ({end.how}; out of memory?)"
+    raise RunError(f"{told}; run again to continue, perhaps with jobs = 1")
 
 
 def _here(
@@ -258,9 +259,7 @@ def _spread(
         yield from _isolated(work, again, rescue)
 
 
-def _in_processes(
-    recipe: Recipe, numbered: Iterable[tuple[int, Any]], jobs: int, timeout_s: float | None
-) -> Generator[tuple[int, Any], None, None]:
+def _in_processes(recipe: Recipe, numbered: Iterable[Numbered], jobs: int, timeout_s: float | None) -> NumberedResults:
     # Only joblib's own processes are ours to end with this one.
     local = isinstance(get_active_backend()[0], BACKENDS["loky"])
     with away_from_here() as ours:
@@ -274,11 +273,11 @@ def _in_processes(
             **({"initializer": end_with, "initargs": ours} if local else {}),
         )
         tasks = (delayed(_do_numbered)(recipe, number, piece) for number, piece in numbered)
-        with closing(cast("Generator[tuple[int, Any], None, None]", parallel(tasks))) as results:
+        with closing(cast(NumberedResults, parallel(tasks))) as results:
             yield from results
 
 
-def _do_numbered(recipe: Recipe, number: int, piece: Any) -> tuple[int, Any]:
+def _do_numbered(recipe: Recipe, number: int, piece: Any) -> Numbered:
     return number, do_sent(recipe, piece)
 
 

@@ -109,9 +109,8 @@ def fit_surrogate(space: Space, trials: Sequence[Trial]) -> Surrogate:
         raise RunError("no trial has a score, so there is nothing to learn from")
     unit = unit_array(space, [trial.values for trial in visited])
     scores = np.array([trial.score for trial in visited], dtype=float)
-    model = GaussianProcessRegressor(
-        kernel=prior_kernel(len(space.intervals)), optimizer=most_probable, normalize_y=True, noise="gaussian"
-    )
+    kernel = prior_kernel(len(space.intervals))
+    model = GaussianProcessRegressor(kernel=kernel, optimizer=most_probable, normalize_y=True, noise="gaussian")
     with threadpool_limits(limits=1), warnings.catch_warnings():
         # A hyperparameter at its bound is an answer, not a failure.
         warnings.simplefilter("ignore", ConvergenceWarning)

@@ -255,10 +255,8 @@ def _explained(path: Path, problem: sqlite3.Error) -> StoreError:
 
 
 def _corrupt(path: Path, detail: str) -> DamagedError:
-    return DamagedError(
-        f"{path}: is damaged ({' '.join(detail.split())}); restore a copy, "
-        f"or keep what is whole: python -m proxytune repair {path.parent}"
-    )
+    remedy = f"restore a copy, or keep what is whole: python -m proxytune repair {path.parent}"
+    return DamagedError(f"{path}: is damaged ({' '.join(detail.split())}); {remedy}")
 
 
 def _check(connection: sqlite3.Connection, path: Path, writable: bool) -> int:

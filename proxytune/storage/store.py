@@ -247,13 +247,9 @@ class Store:
     def save_sweep(self, identity: str, sweep: SweepRecord) -> None:
         """Remember that a sweep has been asked for in the domain family with this identity; it is the last one now."""
         with self._transaction() as connection:
-            row = {
-                "number": _next(connection, "number", "sweeps"),
-                "base": theta_json(sweep.base),
-                "points": json.dumps(sweep.points),
-                "identity": identity,
-            }
-            database.write_row(connection, "sweeps", vars(sweep) | row)
+            row = {"number": _next(connection, "number", "sweeps"), "identity": identity}
+            texts = {"base": theta_json(sweep.base), "points": json.dumps(sweep.points)}
+            database.write_row(connection, "sweeps", vars(sweep) | row | texts)
 
     def sweeps(self) -> list[tuple[str, SweepRecord]]:
         """Every sweep that has been asked for, the last one last, with the identity of its domain family."""

@@ -291,10 +291,8 @@ def _answer(driven: Sequence[Finalist], learnt: Knowledge, again: Knowledge) -> 
     """
     by_values = {learnt.space.values(one.trial.theta): one for one in driven}
     own = learnt.expected_of({values: one.trial.score or 0.0 for values, one in by_values.items()})
-    expected = {
-        values: float(np.mean([own[values], *(score for score in one.scores if score is not None)]))
-        for values, one in by_values.items()
-    }
+    fresh = {values: [score for score in one.scores if score is not None] for values, one in by_values.items()}
+    expected = {values: float(np.mean([own[values], *scores])) for values, scores in fresh.items()}
     best = min(expected, key=expected.__getitem__)
     if False in (learnt.misfit.fits, again.misfit.fits):
         return by_values[best]

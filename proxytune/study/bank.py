@@ -60,10 +60,8 @@ def run_bank(run: StudyRun) -> None:
     for first in range(done, settings.budget, TOGETHER):
         numbers = range(first, min(first + TOGETHER, settings.budget))
         points = [design_point(settings.space, index, settings.seed) for index in numbers]
-        trials = [
-            TrialRecord(index + 1, settings.space.theta(values), "finished")
-            for index, values in zip(numbers, points, strict=True)
-        ]
+        pairs = zip(numbers, map(settings.space.theta, points), strict=True)
+        trials = [TrialRecord(index + 1, theta, "finished") for index, theta in pairs]
         what = f"trials {first + 1} to {first + len(trials)} of {settings.budget}"
         outcomes = run.outcomes([episode for trial in trials for episode in run.episodes_of(trial)], what)
         if not first:

@@ -174,10 +174,8 @@ def _changed(study: Study, store: Store, before: Mapping[str, Any], now: Mapping
     settings = study.settings
     where = f"{settings.path}: {settings.family_name and f'families.{settings.family_name}: '}"
     database = store.path if settings.family_name else store.path.name
-    return SettingsError(
-        f"{where}changed since the first trial: {', '.join(changes(before, now))}; "
-        f"put it back, or move {database} away to start again"
-    )
+    remedy = f"put it back, or move {database} away to start again"
+    return SettingsError(f"{where}changed since the first trial: {', '.join(changes(before, now))}; {remedy}")
 
 
 def _unreadable(

@@ -7,6 +7,7 @@ mean scores, PRPV unless study.toml says otherwise; what others bring as a measu
 """
 
 import functools
+import itertools
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
@@ -226,9 +227,8 @@ def open_bank(settings: StudySettings) -> Study:
     """
     family = load_family(settings, settings.proxy)
     names = dict.fromkeys((*(metric.name for metric in settings.metrics), *family.metrics))
-    table = ScoreTable.from_episodes(
-        {(agent, start): dict.fromkeys(names, 0.0) for agent in settings.agents for start in range(settings.starts)}
-    )
+    cells = itertools.product(settings.agents, range(settings.starts))
+    table = ScoreTable.from_episodes({cell: dict.fromkeys(names, 0.0) for cell in cells})
     return Study(settings, family, table, family.identity, code=user_code(settings))
 
 

@@ -152,10 +152,8 @@ def check_some_work(outcomes: Collection[Outcome], where: str) -> None:
 
     failures = [outcome for outcome in outcomes if outcome.metrics is None]
     if failures and len(failures) == len(outcomes) and len(set(map(kind, failures))) == 1:
-        raise RunError(
-            f"{failures[0].failure}; every agent fails so, in all {len(failures)} episodes of {where}: correct it and "
-            "run the same command again"
-        )
+        told = f"{failures[0].failure}; every agent fails so, in all {len(failures)} episodes of {where}"
+        raise RunError(f"{told}: correct it and run the same command again")
 
 
 PAIRS = 24

@@ -195,9 +195,8 @@ def out_of_time(seconds: float, rules: StopRules) -> str:
     """The phrase where so many seconds are more than the rules allow; empty where they are not."""
     if rules.wall_time_s is None or seconds < rules.wall_time_s:
         return ""
-    return (
-        f"episodes took {seconds:.3g} s and stop.wall_time_s is {rules.wall_time_s:g}; raise or remove it to continue"
-    )
+    told = f"episodes took {seconds:.3g} s and stop.wall_time_s is {rules.wall_time_s:g}"
+    return f"{told}; raise or remove it to continue"
 
 
 def nothing_to_gain(label: str, gain_and_noise: tuple[float, float], rules: StopRules) -> str:
@@ -205,10 +204,8 @@ def nothing_to_gain(label: str, gain_and_noise: tuple[float, float], rules: Stop
     gain, noise = gain_and_noise
     if rules.no_improvement is None or gain >= rules.no_improvement * noise:
         return ""
-    return (
-        f"no θ is expected to improve {label} by more than {gain:.2g}; its noise is {noise:.2g} and"
-        f" stop.no_improvement is {rules.no_improvement:g}; lower or remove it to continue"
-    )
+    remedy = f"stop.no_improvement is {rules.no_improvement:g}; lower or remove it to continue"
+    return f"no θ is expected to improve {label} by more than {gain:.2g}; its noise is {noise:.2g} and {remedy}"
 
 
 def _gain(run: StudyRun, done: Sequence[TrialRecord]) -> tuple[float, float]:

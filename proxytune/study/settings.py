@@ -95,10 +95,8 @@ def unnoticed(folder: Path) -> tuple[str, ...]:
     if not names or not any(is_module(path) for path in files):
         return ()
     more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
-    return (
-        f"{', '.join(names[:NAMED])}{more}: if agents read this, a change in it is not noticed; "
-        "give agents whose weights change another name",
-    )
+    remedy = "give agents whose weights change another name"
+    return (f"{', '.join(names[:NAMED])}{more}: if agents read this, a change in it is not noticed; {remedy}",)
 
 
 FAMILY_KEYS = ("family", "proxy", "domain", "parameters")

@@ -179,11 +179,7 @@ Enough = Callable[[Instance, Mapping[Episode, Outcome]], bool]
 class StudyRun:
     """A study with its store: asked for outcomes or an evaluation, it simulates what is missing and returns them.
 
-    Attributes:
-        study: The study.
-        store: Where every finished episode is kept, at once.
-        watcher: Hears of every episode.
-        spent: What this run has cost so far.
+    Every finished episode is kept in the store at once, its watcher hears of it, and `spent` is what all has cost.
     """
 
     def __init__(self, study: Study, store: Store, watcher: Watcher | None = None) -> None:

@@ -239,17 +239,9 @@ EARLY_S = 5.0
 def start_pose(
     road: Road, index: int, *, seed: int, position_noise_m: float, heading_noise_deg: float
 ) -> tuple[float, float, float]:
-    """Put the robot down at one of the map's starts, as exactly as a hand does.
+    """Put the robot down at one of the map's starts, as exactly as a hand does: x [m], y [m], heading [rad].
 
-    Args:
-        road: The map.
-        index: Which start.
-        seed: Seed of the episode; the same seed and index give the same pose.
-        position_noise_m: Standard deviation of x and of y [m].
-        heading_noise_deg: Standard deviation of the heading [deg].
-
-    Returns:
-        x [m], y [m], heading [rad].
+    Noise is the standard deviation of x and of y, and of the heading; the same seed and index give the same pose.
     """
     x, y, heading_deg = road.starts[index]
     noise = placement_generator(seed, index).standard_normal(3)

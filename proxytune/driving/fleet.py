@@ -343,15 +343,8 @@ def only(results: Sequence[Result | EpisodeError]) -> Result:
 def follow(instance: Instance, plant: Plant, start: Signal, duties: Signal, seed: int) -> Signal:
     """Drive commands on open floor.
 
-    Args:
-        instance: Whose effects bend commands, motion and measurement.
-        plant: What moves, at its start.
-        start: That start (3,): x [m], y [m], heading [rad].
-        duties: Commands (rows, 2), one per control step.
-        seed: Of everything random in the effects.
-
-    Returns:
-        The measured pose at each command (rows, 3).
+    They are duties (rows, 2), one per control step, bent by an instance's effects, which draw by the seed; the plant
+    is at the start (3,). Gives the measured pose at each command (rows, 3).
     """
     course = Course(start, 0.0, seed, lambda x, y: False)
     rollouts, poses = Rollouts([instance], [course], Plants([plant]), blind=True), [start[None]]

@@ -193,12 +193,8 @@ def lane_pose(road: Road, positions: Floats, headings: Floats) -> LanePose:
 
     What counts is the centre line's nearest point, so every finite pose has a finite answer, off the map too.
     The deviation from either lane is continuous everywhere; along and heading error jump only
-    where two parts of the road are equally near.
-
-    Args:
-        road: The map.
-        positions: x and y [m], shape (…, 2).
-        headings: Counter-clockwise from the x axis [rad], shape (…).
+    where two parts of the road are equally near. Positions are x and y [m] (…, 2), headings counter-clockwise from the
+    x axis [rad] (…).
     """
     layout = lay_out(road.begin, road.segments)
     near = find_nearest(layout, positions)
@@ -216,15 +212,9 @@ def lane_pose(road: Road, positions: Floats, headings: Floats) -> LanePose:
 
 
 def lane_point(road: Road, counter_clockwise: Flags | bool, along: Floats | float) -> Floats:
-    """Point of a lane's centre line after so much of a lap: `lane_pose` the other way round.
+    """Point of a lane's centre line after so much of a lap, x and y [m] (…, 2): `lane_pose` the other way round.
 
-    Args:
-        road: The map.
-        counter_clockwise: Whether it is the outer lane, else the inner one.
-        along: Arc length in the lane's direction [m], shape (…); whole laps make no difference.
-
-    Returns:
-        x and y [m], shape (…, 2).
+    It is `along` the outer lane, or the inner one, in its direction [m] (…); whole laps make no difference.
     """
     layout, offset = lay_out(road.begin, road.segments), _offset(road, counter_clockwise)
     part = len(layout.side) // layout.repeats

@@ -100,15 +100,10 @@ def floor_hits(figures: CameraFigures, right: float, down: float) -> NDArray[np.
 
 
 def floor_points(figures: CameraFigures, columns: NDArray[Any], rows: NDArray[Any]) -> NDArray[np.float64]:
-    """Points of the floor at which any points of the picture look, in the robot's frame.
+    """Points of the floor (…, 2) at which any places (…) in the picture look, from its left and upper edge [pixel].
 
-    Args:
-        figures: Of the camera.
-        columns: Places (…) from the picture's left edge [pixel]; the first pixel's middle is at 0.5.
-        rows: Places (…) from its upper edge [pixel].
-
-    Returns:
-        Shape (…, 2): x ahead of the axle and y to the left [m]; NaN at and above the horizon.
+    The first pixel's middle is at 0.5. Points are x ahead of the axle and y to the left [m]; NaN at and above the
+    horizon.
     """
     rays = lens_rays(figures, columns, rows)
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -70,15 +70,9 @@ def running(
 ) -> Iterator[Iterator[list[Outcome]]]:
     """Run episodes and give the outcomes of a fleet as soon as they are there, in no particular order; see `working`.
 
-    An episode that ends two processes, the second one its own, has failed, and so has one that takes too long.
-
-    Args:
-        family: Where they run; only a `domain.FleetFamily` has fleets of more than one episode.
-        episodes: Which, those that take longest first.
-        jobs: How many processes.
-        skip: Whether an episode need not be run any more, asked when its fleet is about to begin.
-        needed: As of run_episode.
-        watch: How they are watched.
+    An episode that ends two processes, the second one its own, has failed, and so has one that takes too long. Those
+    that take longest come first; whether to `skip` one is asked when its fleet is about to begin. Only a
+    `domain.FleetFamily` has fleets of more than one episode.
 
     Raises:
         RunError: If the machine fails rather than an episode: memory, disk or descriptors run out.

@@ -103,11 +103,7 @@ def watching(progress: bool, total: int, unit: str = "episodes") -> AbstractCont
 
 
 class Lines:
-    """Plain lines on standard error, each after the seconds so far; on a terminal few, since a bar is there.
-
-    Attributes:
-        console: Standard error.
-    """
+    """Plain lines on standard error, each after the seconds so far; on a terminal few, since a bar is there."""
 
     def __init__(self) -> None:
         self.console = Console(stderr=True)

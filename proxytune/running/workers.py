@@ -166,13 +166,8 @@ def working(
     """Do pieces of work and give each result as soon as it is there, in no particular order.
 
     Which process does a piece, and after which, must not change its result. With several jobs, joblib's backend is
-    the caller's choice (processes of this machine by default). Leaving the context drops the pieces not yet done.
-
-    Args:
-        work: Does one piece; picklable.
-        pieces: What to do, in the order in which to begin; the next one is asked for when it is about to begin.
-        jobs: How many processes; with one, and no time-out, everything is done in this process.
-        rescue: What becomes of pieces that end their process; nothing else can be done without them.
+    the caller's choice (processes of this machine by default); with one, and no time-out, everything is done in this
+    process. The next piece is asked for when it is about to begin. Leaving the context drops those not yet done.
 
     Raises:
         RunError: If a process dies and there is no rescue.

@@ -46,10 +46,8 @@ NARROW = 1.0
 def run_stages(run: StudyRun, warn: Callable[[str], None], known: Sequence[Outcome | Theta] = ()) -> None:
     """Run a study to its end, from wherever it was left: pre-flight, trials, fresh episodes.
 
-    Args:
-        run: The study.
-        warn: Hears, before the first trial, of another search than before and of parameters without effect.
-        known: θ to try next, before what the search proposes, and outcomes that need not be simulated.
+    Before the first trial `warn` hears of another search than before and of parameters without effect. What is known
+    are θ to try next, before what the search proposes, and outcomes that need not be simulated.
 
     Raises:
         InputError, RunError: As `run_trials`.

@@ -29,9 +29,10 @@ ON_OUTPUTS = (
     "4ae305889b1d",
     "cb79f534eabb",
     "f82ad3cb55f6",
+    "4c890121cd60",
 )
 """Code of the two engines that learn from outputs, which have a module in common."""
-ON_NOTHING = ("40019bb841cc", "aa9b7e2da380", "a00262704239")
+ON_NOTHING = ("40019bb841cc", "aa9b7e2da380", "a00262704239", "8e3a9627dfe6")
 """Code of the design, and of the engines that learn nothing and lie beside it."""
 SAME_CODE = {
     "driving": (
@@ -55,6 +56,7 @@ SAME_CODE = {
         "dc47375fd36dc4589301ccaf4a331ee5a1b35a76593fbed672df4954e55f1a4e",
         "4d7475f410334f3a96d92c4141cf81304858b531b86b58dc8a6ed921757c397a",
         "c7f99e82aa0f59dc2ba40846c46547b51815fc2a445ca38e20cf05ceb776ff4a",
+        "c53aec37ea08cc5962596d43314b021e69e072595b4800621ddf451de67e7133",
     ),
     "environments": (
         "f5b9c2c9586c29cd4dc2d6e27f44fd2731ecc2d27bf96a80c745aecd5a3ddb50",
@@ -67,13 +69,22 @@ SAME_CODE = {
         "c5523b5296a6a48b0e23a40895df9c52c004cedb3bdc378686ace873eaa8c948",
         "54a8fd61c63643c8c438e427102c873b84f56fd1f0b4888e779d7e150bb5f8dc",
         "7018647b4590bd6de0ad919cafea716c33f6dd361c083b4182f8dcae19b3acc4",
+        "dc963200ccddff2119190c22d2c85b6efe88abcabd84d90cdb8f3f31f83a0357",
     ),
     "engine outcomes": ("94c0ba12f9bf", *ON_OUTPUTS),
     "engine composite": ("82865583b592", *ON_OUTPUTS),
-    "engine gp": ("231c6791b2b7", "1dae7f006157", "41a805e87825", "d952ced2ab68"),
+    "engine gp": ("231c6791b2b7", "1dae7f006157", "41a805e87825", "d952ced2ab68", "f2f5943bdb31"),
     "engine random": ("0faabd65d4d9", *ON_NOTHING),
     "engine sobol": ("225f0b0407fb", *ON_NOTHING),
-    "engine tpe": ("7bbfc93f55ba", "5004f0c9a482", "dab8e44a497a", "ddc23b002b6e", "126945151387", "36d1df1ab446"),
+    "engine tpe": (
+        "7bbfc93f55ba",
+        "5004f0c9a482",
+        "dab8e44a497a",
+        "ddc23b002b6e",
+        "126945151387",
+        "36d1df1ab446",
+        "c0dacb4b2963",
+    ),
     "design": ("3695c894b9c7", *ON_NOTHING),
     "learner proxytune.learning.cloning": (
         "ceb19d953492d57f248e919c7553724e5616f3b383452117639093a35b2ce432",

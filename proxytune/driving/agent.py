@@ -18,8 +18,6 @@ class Agent(Protocol):
 
     def begin(self, robot: Robot) -> Any:
         """The memory before the first picture; an agent knows the robot's *nominal* figures only."""
-        ...
 
     def act(self, picture: Picture, memory: Any) -> tuple[Command, Any]:
         """The command for the newest picture, and the memory for the next; called at the control rate."""
-        ...

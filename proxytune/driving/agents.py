@@ -45,11 +45,9 @@ class Deciding(Protocol):
 
     def begin(self, robot: Robot) -> Any:
         """The memory before the first picture."""
-        ...
 
     def decide(self, memory: Any) -> Decision:
         """Look at the newest picture, and decide."""
-        ...
 
     def act(self, picture: Picture, memory: Any) -> tuple[Command, Any]:
         """The command for the newest picture, and the memory for the next."""
@@ -64,15 +62,9 @@ class Deciding(Protocol):
 def act_together(
     agents: Sequence[Deciding], pictures: NDArray[np.uint8] | Seen, memories: Sequence[Any]
 ) -> tuple[NDArray[np.float64], list[Any]]:
-    """Ask several agents at once, each for the command that it would give by itself, to the bit.
+    """The commands (n, 2) that the agents of several robots would give by themselves, to the bit, and their memories.
 
-    Args:
-        agents: One for each robot, the same for several robots or not.
-        pictures: The newest of each robot (n, rows, columns, 3); or what is known of them, while they are the newest.
-        memories: Of each robot's agent.
-
-    Returns:
-        The commands (n, 2), and the memories for the next pictures.
+    Pictures are the newest of each robot (n, rows, columns, 3); or what is known of them, while they are the newest.
     """
     seen = pictures if isinstance(pictures, Seen) else Seen(parted(pictures))
     if len(agents) == 1:
@@ -153,25 +145,15 @@ def duties(speed: float, yaw_rate: float, *, full_speed: float, baseline: float)
 
 @dataclass(frozen=True)
 class LanePilot(Deciding):
-    """Segments the markings by colour, projects them on the floor and steers by offset and direction (PD).
+    """Segments the markings by colour, projects them on the floor and steers by offset and direction (PD)."""
 
-    Attributes:
-        speed: Forward speed [m/s].
-        offset_gain: Yaw rate for the lane's offset [rad/s per m].
-        slope_gain: Yaw rate for the lane's direction [rad/s].
-        markings: Which markings it goes by.
-        reach_m: How far ahead it looks [m].
-        contrast: How yellow a pixel must be (0 to 255).
-        brightness: How white a pixel must be (0 to 255).
-    """
-
-    speed: float
-    offset_gain: float
-    slope_gain: float
-    markings: Literal["both", "yellow", "white"] = "both"
-    reach_m: float = 0.5
-    contrast: float = 60.0
-    brightness: float = 150.0
+    speed: float  # forward speed [m/s]
+    offset_gain: float  # yaw rate for the lane's offset [rad/s per m]
+    slope_gain: float  # yaw rate for the lane's direction [rad/s]
+    markings: Literal["both", "yellow", "white"] = "both"  # which markings it goes by
+    reach_m: float = 0.5  # how far ahead it looks [m]
+    contrast: float = 60.0  # how yellow a pixel must be (0 to 255)
+    brightness: float = 150.0  # how white a pixel must be (0 to 255)
 
     def begin(self, robot: Robot) -> PilotMemory:
         """Nothing seen yet."""
@@ -190,17 +172,11 @@ class LanePilot(Deciding):
 
 @dataclass(frozen=True)
 class PursuitPilot(Deciding):
-    """Pure pursuit of a point on the lane's centre as the markings show it.
+    """Pure pursuit of a point on the lane's centre as the markings show it."""
 
-    Attributes:
-        speed: Forward speed on the straight [m/s].
-        look_ahead_m: Distance of the point pursued [m].
-        caution: Share of the speed given up per unit of curvature times look-ahead.
-    """
-
-    speed: float
-    look_ahead_m: float
-    caution: float = 0.0
+    speed: float  # forward speed on the straight [m/s]
+    look_ahead_m: float  # distance of the point pursued [m]
+    caution: float = 0.0  # share of the speed given up per unit of curvature times look-ahead
 
     def begin(self, robot: Robot) -> PilotMemory:
         """Nothing seen yet."""
@@ -226,16 +202,11 @@ class Braitenberg(Deciding):
     """Two eyes, crossed wires: yellow on the right pushes right, white on the left pushes left.
 
     Like Duckietown's Braitenberg exercise: what it sees drives the wheels and nothing is remembered.
-
-    Attributes:
-        speed: Forward speed [m/s].
-        push: Yaw rate for a marking that fills its half of the picture's lower part [rad/s].
-        first_row: Where the lower part begins, as a share of the picture's height.
     """
 
-    speed: float
-    push: float
-    first_row: float = 0.45
+    speed: float  # forward speed [m/s]
+    push: float  # yaw rate for a marking that fills its half of the picture's lower part [rad/s]
+    first_row: float = 0.45  # where the lower part begins, as a share of the picture's height
 
     def begin(self, robot: Robot) -> PilotMemory:
         """Wires for this robot's camera."""
@@ -253,18 +224,12 @@ class EdgePilot(Deciding):
     """Balances sharp edges: steers for the gap between the contours left and right of the picture's middle.
 
     It sees brightness steps, not colours, so a smeared picture leaves it little to go by.
-
-    Attributes:
-        speed: Forward speed [m/s].
-        gain: Yaw rate when all contours are on one side [rad/s].
-        step: Smallest brightness step between neighbouring pixels that counts (of 255).
-        first_row: Where in the picture it begins to look, as a share of the height.
     """
 
-    speed: float
-    gain: float
-    step: float = 60.0
-    first_row: float = 0.55
+    speed: float  # forward speed [m/s]
+    gain: float  # yaw rate when all contours are on one side [rad/s]
+    step: float = 60.0  # smallest brightness step between neighbouring pixels that counts (of 255)
+    first_row: float = 0.55  # where in the picture it begins to look, as a share of the height
 
     def begin(self, robot: Robot) -> PilotMemory:
         """Wires for this robot's camera."""
@@ -338,18 +303,12 @@ class Wary(Deciding):
     """Another agent's path, driven as fast as the yellow dashes look crisp.
 
     Motion smears the dashes into their gaps, so this agent drives at the speed at which it still sees well.
-
-    Attributes:
-        agent: Whose path it drives.
-        contrast: How yellow a pixel must be to count as crisp (0 to 255).
-        crisp: How many crisp pixels it takes to drive at full speed.
-        slowest: Share of the speed it keeps when it sees none.
     """
 
-    agent: Agent
-    contrast: float
-    crisp: float
-    slowest: float = 0.3
+    agent: Agent  # whose path it drives
+    contrast: float  # how yellow a pixel must be to count as crisp (0 to 255)
+    crisp: float  # how many crisp pixels it takes to drive at full speed
+    slowest: float = 0.3  # share of the speed it keeps when it sees none
 
     def begin(self, robot: Robot) -> tuple[Markings, float, Any]:
         """At its slowest."""
@@ -425,11 +384,7 @@ NEEDS = ("begin", "act")
 
 
 def load_agent(name: str, folder: Path) -> Agent:
-    """The agent of this name.
-
-    Args:
-        name: A key of AGENTS, a plug-in, or `module:attribute`: an agent, or what makes one when called.
-        folder: Where a user's modules lie besides the installed ones.
+    """The agent of this name: a key of AGENTS, a plug-in, or `module:attribute`, an agent or what makes one.
 
     Raises:
         ExtensionError: If there is no such agent.

@@ -129,9 +129,8 @@ class BulletPlant:
             heading = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
             reached += math.remainder(heading - reached, math.tau)
             cosine, sine = math.cos(heading), math.sin(heading)
-            poses.append(
-                (centre[0] - cosine * ahead + sine * aside, centre[1] - sine * ahead - cosine * aside, reached)
-            )
+            axle_x, axle_y = centre[0] - cosine * ahead + sine * aside, centre[1] - sine * ahead - cosine * aside
+            poses.append((axle_x, axle_y, reached))
         self._heading = reached
         # On its wheels and caster the chassis touches nothing
         touched = pybullet.getContactPoints(bodyA=body, linkIndexA=-1, physicsClientId=world)

@@ -24,10 +24,7 @@ class GroundPlaneCamera:
     """The default camera: the robot drives flat, so where each pixel looks in its frame is known beforehand.
 
     A pixel looks up one point in that of several blurred copies of the floor's picture whose blur is as wide as what
-    the pixel covers there; without that, small pictures of a sharp floor alias.
-
-    Attributes:
-        shape: Of its pictures: rows, columns, 3.
+    the pixel covers there; without that, small pictures of a sharp floor alias. Its pictures have a `shape`.
     """
 
     def __init__(self, figures: CameraFigures, floor: Floor) -> None:
@@ -45,16 +42,9 @@ class GroundPlaneCamera:
     def expose(
         self, poses: NDArray[np.floating[Any]], weights: Signal, first: int = 0, level: Any = np.uint8
     ) -> NDArray[Any]:
-        """Expose while it moves.
+        """Weighted means (n, 3, rows, columns) of what it sees from poses at several times (n, times, 3).
 
-        Args:
-            poses: Of each robot at several times, (n, times, 3).
-            weights: Of those times.
-            first: The first pixel that is looked at; those before may be anything.
-            level: Kind of the levels, 0 to 255; bytes are rounded.
-
-        Returns:
-            Weighted means of what it sees at those times, (n, 3, rows, columns).
+        Pixels before the first may be anything; `level` is the kind of levels, 0 to 255, of which bytes are rounded.
         """
         on_floor = max(first, self._sky)
         if on_floor not in self._tables:
@@ -97,19 +87,12 @@ def _tabulate(figures: CameraFigures, floor: Floor) -> tuple[int, TexelTable]:
 
 @dataclass(frozen=True)
 class _Copies:
-    """Copies of a floor's picture, each blurred over twice the width of the one before, in one row of texels.
+    """Copies of a floor's picture, each blurred over twice the width of the one before, in one row of texels."""
 
-    Attributes:
-        texels: Red, green, blue and a spare byte in one number each; the last is the sky.
-        firsts: Index of each copy's first texel.
-        sides: Texels along a side of each copy.
-        per_metre: Texels per metre of each copy.
-    """
-
-    texels: NDArray[np.uint32]
-    firsts: NDArray[np.int64]
-    sides: NDArray[np.int64]
-    per_metre: NDArray[np.float64]
+    texels: NDArray[np.uint32]  # red, green, blue and a spare byte in one number each; the last is the sky
+    firsts: NDArray[np.int64]  # index of each copy's first texel
+    sides: NDArray[np.int64]  # texels along a side of each copy
+    per_metre: NDArray[np.float64]  # texels per metre of each copy
 
 
 OCTAVES = 6
@@ -144,17 +127,11 @@ def _blur_octaves(figures: CameraFigures, floor: Floor) -> NDArray[np.int64]:
 
 
 class _Exposed:
-    """Film on which a picture is a weighted mean of what the camera saw at the last ticks, which is all that blur does.
+    """Film on which a picture is a weighted mean of what was seen at the last ticks, which is all that blur does."""
 
-    Attributes:
-        partial: Whether it can show parts, and the same picture again.
-    """
+    partial = True  # it can show parts, and the same picture again
 
-    partial = True
-
-    def __init__(
-        self, camera: GroundPlaneCamera, weights: Signal, contexts: Sequence[FilterContext], level: Any
-    ) -> None:
+    def __init__(self, camera: Any, weights: Signal, contexts: Sequence[FilterContext], level: Any) -> None:
         self._camera, self._weights, self._level = camera, weights, level
         self._poses = np.repeat(np.stack([context.rest for context in contexts])[:, None], len(weights), axis=1)
 
@@ -166,24 +143,23 @@ class _Exposed:
 
     def expose(self, robots: Sequence[int], first: int) -> NDArray[Any]:
         """The newest pictures (n, 3, rows, columns) of robots, right from the first pixel on."""
-        return self._camera.expose(self._poses[list(robots)], self._weights, first, self._level)
+        return np.asarray(self._camera.expose(self._poses[list(robots)], self._weights, first, self._level))
 
 
-class _Averaged:
+class _Averaged(_Exposed):
     """The same of a camera that can only render, which it does once for each pose."""
 
     partial = False
 
     def __init__(self, camera: Renderer, weights: Signal, contexts: Sequence[FilterContext], level: Any) -> None:
-        self._camera, self._weights, self._level = camera, weights, level
-        self._poses = np.repeat(np.stack([context.rest for context in contexts])[:, None], len(weights), axis=1)
+        super().__init__(camera, weights, contexts, level)
         self._rendered: dict[int, NDArray[np.uint8]] = {}
         self._new = len(weights)
 
     def see(self, poses: Signal) -> None:
-        """Let in the poses (robots, ticks, 3) since the picture before; the last are kept, as many as are averaged."""
+        """Let in the poses (robots, ticks, 3) since the picture before."""
+        super().see(poses)
         self._new = min(self._new + poses.shape[1], len(self._weights))
-        self._poses = np.concatenate((self._poses, poses), axis=1)[:, -len(self._weights) :]
 
     def expose(self, robots: Sequence[int], first: int) -> NDArray[Any]:
         """The newest pictures (n, 3, rows, columns) of robots."""
@@ -229,9 +205,6 @@ class Views:
     """What the cameras of robots that drive side by side show through the image effects, at the camera's rate.
 
     Pictures that nobody asks for are not drawn.
-
-    Attributes:
-        changed: Whether the last poses brought new pictures; so they do to all robots or to none.
     """
 
     def __init__(self, camera: Renderer, image: Chain, contexts: Sequence[FilterContext]) -> None:
@@ -243,7 +216,7 @@ class Views:
         mixing, self._alone = image.parted()
         weights = mixing.mean_weights(contexts[0].rate_hz)
         level = np.float32 if self._alone.effects else np.uint8
-        self._film: _Mixed | _Exposed | _Averaged
+        self._film: _Mixed | _Exposed
         if weights is None:
             self._film = _Mixed(camera, mixing, developed)
         elif isinstance(camera, GroundPlaneCamera):
@@ -258,7 +231,7 @@ class Views:
         self._shows: list[int] = []
         self._first = sys.maxsize if self._film.partial and not self._alone.effects else 0
         self._let_in(1)
-        self.changed = True
+        self.changed = True  # whether the last poses brought new pictures; so they do to all robots or to none
 
     def pass_by(self, poses: Signal, robots: Sequence[int]) -> None:
         """Let robots under way see their poses (robots, ticks, 3) of the next ticks; the others have left for good."""

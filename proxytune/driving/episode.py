@@ -35,33 +35,20 @@ TICK_HZ = 60
 
 @dataclass(frozen=True)
 class Instance:
-    """A domain instance S_θ, ready to drive.
+    """A domain instance S_θ, ready to drive."""
 
-    Attributes:
-        robot: Whose figures the agents know.
-        drivetrain: Command, actuation and motion effects.
-        camera: Mounted as the camera effects have it.
-        image: The image effects.
-        measurement: The measurement effects.
-    """
-
-    robot: Robot
-    drivetrain: Drivetrain
-    camera: Renderer
-    image: Chain
-    measurement: Chain
+    robot: Robot  # whose figures the agents know
+    drivetrain: Drivetrain  # command, actuation and motion effects
+    camera: Renderer  # mounted as the camera effects have it
+    image: Chain  # the image effects
+    measurement: Chain  # the measurement effects
 
 
 class Sight(NamedTuple):
-    """Sight of an expert, who need not make do with the picture.
+    """Sight of an expert, who need not make do with the picture."""
 
-    Attributes:
-        picture: The newest picture.
-        pose: Where the robot truly is, (3,): x [m], y [m], heading [rad].
-    """
-
-    picture: Picture
-    pose: Signal
+    picture: Picture  # the newest picture
+    pose: Signal  # where the robot truly is, (3,): x [m], y [m], heading [rad]
 
 
 class Driver(Protocol):
@@ -69,54 +56,40 @@ class Driver(Protocol):
 
     def begin(self, robot: Robot, /) -> Any:
         """The memory before the first command."""
-        ...
 
     def act(self, seen: Any, memory: Any, /) -> tuple[Command, Any]:
         """The next command, and the memory for the one after it."""
-        ...
 
 
 class Drive(NamedTuple):
-    """Record of an episode.
+    """Record of an episode."""
 
-    Attributes:
-        poses: Start, then the pose after every tick, (ticks + 1, 3): x [m], y [m], heading [rad].
-        commands: What the agent issued, (control steps, 2).
-        crashed: Whether it ended by hitting something or falling over.
-        memory: What the driver remembered in the end.
-    """
-
-    poses: Signal
-    commands: Signal
-    crashed: bool
-    memory: Any
+    poses: Signal  # start, then the pose after every tick, (ticks + 1, 3): x [m], y [m], heading [rad]
+    commands: Signal  # what the agent issued, (control steps, 2)
+    crashed: bool  # whether it ended by hitting something or falling over
+    memory: Any  # what the driver remembered in the end
 
     def columns(self, robot: Robot) -> tuple[dict[str, Signal], dict[str, Signal]]:
         """Poses and commands of the robot as columns by name, each with its `time` [s]."""
         control_hz = robot.figures["control_rate"]
         poses = dict(zip(("x", "y", "heading"), self.poses.T, strict=True))
         commands = dict(zip(robot.columns, self.commands.T, strict=True))
-        return (
-            {"time": np.arange(len(self.poses)) / TICK_HZ, **poses},
-            {"time": np.arange(len(self.commands)) / control_hz, **commands},
-        )
+        posed, issued = np.arange(len(self.poses)) / TICK_HZ, np.arange(len(self.commands)) / control_hz
+        return {"time": posed, **poses}, {"time": issued, **commands}
 
 
 @dataclass(frozen=True)
 class Course:
-    """Start and end of an episode.
+    """Start and end of an episode."""
 
-    Attributes:
-        start: Starting pose (3,): x [m], y [m], heading [rad].
-        seconds: When time is over [s].
-        seed: Seed of everything random in the effects.
-        ended: Whether a robot at x, y [m] has left the course.
-    """
+    start: Signal  # starting pose (3,): x [m], y [m], heading [rad]
+    seconds: float  # when time is over [s]
+    seed: int  # seed of everything random in the effects
+    ended: Callable[[float, float], bool]  # whether a robot at x, y [m] has left the course
 
-    start: Signal
-    seconds: float
-    seed: int
-    ended: Callable[[float, float], bool]
+
+Sees = Callable[[Picture, Signal], Any]
+"""What a driver is shown of the newest picture and the true pose."""
 
 
 def picture_only(picture: Picture, pose: Signal) -> Picture:
@@ -166,31 +139,21 @@ def grouped(drivers: Sequence[Driver]) -> list[list[int]]:
     return [numbers for key, numbers in members.items() if key is None or len(numbers) > 1]
 
 
-class Shown:
-    """What drivers are shown: kept while the pictures are the newest.
+Shown = list[tuple[list[int], Callable[[list[Any]], Any]]]
+"""Numbers of drivers that are asked at once, and how: by what they look at, or by their own `act_many`."""
 
-    Attributes:
-        alone: Gives what the drivers of some numbers see, who are asked one by one.
-        groups: Numbers of drivers that are asked at once, and how: by what they look at, or by their own `act_many`.
-    """
 
-    def __init__(
-        self,
-        drivers: Sequence[Driver],
-        alone: Callable[[list[int]], Iterable[Any]],
-        draw: Callable[[int], NDArray[np.uint8]],
-        groups: Sequence[list[int]],
-    ) -> None:
-        """Show each group its part."""
-        self.alone = alone
-        self.groups: list[tuple[list[int], Callable[[list[Any]], Any]]] = []
-        for numbers in groups:
-            of_group: list[Any] = [drivers[number] for number in numbers]
-            if _looks(of_group[0]):
-                self.groups.append((numbers, functools.partial(act_together, of_group, Seen(draw, rows_of(numbers)))))
-            else:
-                pictures = joined(draw(0)[rows_of(numbers)])
-                self.groups.append((numbers, functools.partial(of_group[0].act_many, pictures)))
+def show(drivers: Sequence[Driver], draw: Callable[[int], NDArray[np.uint8]], groups: Sequence[list[int]]) -> Shown:
+    """Show each group its part of the pictures, to be kept while these are the newest."""
+    shown: Shown = []
+    for numbers in groups:
+        of_group: list[Any] = [drivers[number] for number in numbers]
+        if _looks(of_group[0]):
+            shown.append((numbers, functools.partial(act_together, of_group, Seen(draw, rows_of(numbers)))))
+        else:
+            pictures = joined(draw(0)[rows_of(numbers)])
+            shown.append((numbers, functools.partial(of_group[0].act_many, pictures)))
+    return shown
 
 
 def _looks(driver: Any) -> bool:
@@ -199,23 +162,26 @@ def _looks(driver: Any) -> bool:
 
 
 def ask_many(
-    drivers: Sequence[Driver], shown: Shown, memories: Sequence[Any], time_s: float
+    drivers: Sequence[Driver],
+    shown: Shown,
+    see: Callable[[list[int]], Iterable[Any]],
+    memories: Sequence[Any],
+    time_s: float,
 ) -> tuple[Signal, list[Any], dict[int, EpisodeError]]:
     """Ask drivers for their next commands, together where they can: one by one the culprit of an error is named.
 
-    Returns:
-        Commands (drivers, 2), memories for the ones after, and by its number why a driver failed, with the time [s].
+    Those are asked by what they `see`. Gives commands (drivers, 2), memories, and by its number why a driver failed.
     """
     commands, after, failed = np.zeros((len(drivers), 2)), list(memories), {}
     alone = set(range(len(drivers)))
-    for numbers, act in shown.groups:
+    for numbers, act in shown:
         together = _ask_together(act, [memories[number] for number in numbers])
         if together is not None:
             commands[numbers], kept = together
             alone.difference_update(numbers)
             for number, memory in zip(numbers, kept, strict=True):
                 after[number] = memory
-    for number, seen in zip(sorted(alone), shown.alone(sorted(alone)) if alone else (), strict=True):
+    for number, seen in zip(sorted(alone), see(sorted(alone)) if alone else (), strict=True):
         try:
             commands[number], after[number] = ask(drivers[number], seen, memories[number], time_s)
         except EpisodeError as problem:
@@ -235,11 +201,7 @@ def _ask_together(act: Callable[[list[Any]], Any], memories: list[Any]) -> tuple
 
 
 def ask(driver: Driver, seen: Any, memory: Any, time_s: float) -> tuple[Command, Any]:
-    """A driver's next command and memory.
-
-    Raises:
-        EpisodeError: With the time [s], if it raises or its answer is not two finite duties.
-    """
+    """A driver's next command and memory; refused, with the time [s], where it raises or these are none."""
     try:
         answer, memory = driver.act(seen, memory)
         command = np.asarray(answer, dtype=float)
@@ -252,9 +214,8 @@ def ask(driver: Driver, seen: Any, memory: Any, time_s: float) -> tuple[Command,
 def check_command(command: Command, time_s: float) -> None:
     """Refuse what are not two finite duties, with the time [s]."""
     if command.shape != (2,):
-        raise EpisodeError(
-            f"answered with shape {command.shape} at {time_s:.2f} s; a command is two duties, left and right"
-        )
+        told = f"answered with shape {command.shape} at {time_s:.2f} s"
+        raise EpisodeError(f"{told}; a command is two duties, left and right")
     if not (math.isfinite(command[0]) and math.isfinite(command[1])):
         raise EpisodeError(f"answered {command.tolist()} at {time_s:.2f} s; duties must be finite")
 
@@ -278,17 +239,9 @@ EARLY_S = 5.0
 def start_pose(
     road: Road, index: int, *, seed: int, position_noise_m: float, heading_noise_deg: float
 ) -> tuple[float, float, float]:
-    """Put the robot down at one of the map's starts, as exactly as a hand does.
+    """Put the robot down at one of the map's starts, as exactly as a hand does: x [m], y [m], heading [rad].
 
-    Args:
-        road: The map.
-        index: Which start.
-        seed: Seed of the episode; the same seed and index give the same pose.
-        position_noise_m: Standard deviation of x and of y [m].
-        heading_noise_deg: Standard deviation of the heading [deg].
-
-    Returns:
-        x [m], y [m], heading [rad].
+    Noise is the standard deviation of x and of y, and of the heading; the same seed and index give the same pose.
     """
     x, y, heading_deg = road.starts[index]
     noise = placement_generator(seed, index).standard_normal(3)
@@ -346,16 +299,7 @@ def driving_score(road: Road, poses: Floats, *, wheel_distance: float, tick_s: f
 
     Each second with one wheel outside the lane takes one off, each with both wheels two, so 60 s are worth −60 to 60.
     It ends where the robot leaves the map. Standing still in the lane counts as driving, as it does in the paper.
-
-    Args:
-        road: The map.
-        poses: x [m], y [m], heading [rad] at a constant rate, shape (samples, 3).
-        wheel_distance: Distance between the wheels [m].
-        tick_s: Time between two poses [s].
-        seconds: When time is over [s].
-
-    Raises:
-        EpisodeError: If a pose is not finite.
+    Wheels are so far apart [m]; else as `score_trajectory`.
     """
     driven = _driven(road, poses, tick_s=tick_s, seconds=seconds)
     headings = driven[:, 2]

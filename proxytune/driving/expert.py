@@ -29,21 +29,13 @@ PUSHES = {"differential": np.array((-1.0, 1.0)), "ackermann": np.array((0.0, 1.0
 
 
 class LessonMemory(NamedTuple):
-    """Memory of what a lesson has shown so far.
+    """Memory of what a lesson has shown so far."""
 
-    Attributes:
-        robot: Whose nominal figures are known.
-        disturbance: What was added to the steering at the last step [duty].
-        pictures: One before every command.
-        commands: What the expert would do, undisturbed.
-        on_road: Whether the middle of its axle was on the road then, whichever lane.
-    """
-
-    robot: Robot
-    disturbance: float
-    pictures: tuple[Picture, ...]
-    commands: tuple[Command, ...]
-    on_road: tuple[bool, ...]
+    robot: Robot  # whose nominal figures are known
+    disturbance: float  # what was added to the steering at the last step [duty]
+    pictures: tuple[Picture, ...]  # one before every command
+    commands: tuple[Command, ...]  # what the expert would do, undisturbed
+    on_road: tuple[bool, ...]  # whether the middle of its axle was on the road then, whichever lane
 
     @property
     def samples(self) -> Demonstration:
@@ -58,22 +50,14 @@ class Expert:
 
     Whoever imitates an expert that never errs has not seen what to do after its own first error, so the steering is
     disturbed while the command that is shown is the undisturbed one (Laskey et al. 2017, DART).
-
-    Attributes:
-        road: The map.
-        look_ahead_m: How far along the lane's centre line the pursued point lies [m].
-        speed: Forward speed [m/s].
-        gain: Steering relative to the arc through that point.
-        disturbance: Standard deviation of what is added to the steering [duty].
-        seed: Seed of the disturbance.
     """
 
-    road: Road
-    look_ahead_m: float
-    speed: float
-    gain: float
-    disturbance: float
-    seed: int
+    road: Road  # the map
+    look_ahead_m: float  # how far along the lane's centre line the pursued point lies [m]
+    speed: float  # forward speed [m/s]
+    gain: float  # steering relative to the arc through that point
+    disturbance: float  # standard deviation of what is added to the steering [duty]
+    seed: int  # seed of the disturbance
 
     def begin(self, robot: Robot) -> LessonMemory:
         """Nothing shown yet."""
@@ -136,15 +120,10 @@ class Played(NamedTuple):
 
 
 class Observation(NamedTuple):
-    """Poses and pictures that recorded commands lead to.
+    """Poses and pictures that recorded commands lead to."""
 
-    Attributes:
-        poses: Start, then the pose after every tick, (ticks + 1, 3): x [m], y [m], heading [rad].
-        pictures: The picture before every command, (steps, rows, columns, 3).
-    """
-
-    poses: NDArray[np.float64]
-    pictures: NDArray[np.uint8]
+    poses: NDArray[np.float64]  # start, then the pose after every tick, (ticks + 1, 3): x [m], y [m], heading [rad]
+    pictures: NDArray[np.uint8]  # the picture before every command, (steps, rows, columns, 3)
 
 
 @dataclass(frozen=True)

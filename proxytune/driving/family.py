@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from proxytune.domain import Demonstration, Episode, Policy, Recording
-from proxytune.driving.agent import Agent, Picture
+from proxytune.driving.agent import Agent
 from proxytune.driving.agents import AGENTS, AtTheWheel, load_agent
 from proxytune.driving.bullet import BulletCamera, need_pybullet
 from proxytune.driving.cameras import GroundPlaneCamera
@@ -24,6 +24,7 @@ from proxytune.driving.episode import (
     Drive,
     Driver,
     Instance,
+    Sees,
     Sight,
     driving_score,
     measured,
@@ -53,12 +54,8 @@ Score = TypeVar("Score")
 def identity_of(settings: tuple[Any, ...], robot: Path, folder: Path, versions: Mapping[str, str]) -> str:
     """A digest of settings, of what our code, the robot's files and the user's modules mean, and of versions.
 
-    Args:
-        settings: Of the family, without the folder. Their `repr` counts: a class of theirs, as that of the map, cannot
-            be renamed without giving every episode another name.
-        robot: The robot's folder.
-        folder: Where the user's modules lie.
-        versions: Of the packages that simulate.
+    The settings' `repr` counts: a class of theirs, as that of the map, cannot be renamed without giving every episode
+    another name.
     """
     own = meaning_of(modules_beside(folder), folder)
     return digest(settings, code_name("driving"), robot_meaning(robot), own, sorted(versions.items()))
@@ -113,30 +110,18 @@ CAMERAS = ("ground_plane", "renderer")
 
 @dataclass(frozen=True)
 class LaneFollowing:
-    """S_Θ of a robot that follows a lane.
+    """S_Θ of a robot that follows a lane."""
 
-    Attributes:
-        robot: Name of the robot.
-        plant: One of PLANTS.
-        camera: One of CAMERAS.
-        map: The road, whether the package's or the user's own.
-        seconds: Longest time an episode takes [s].
-        position_noise_m: Standard deviation of where the robot is put down [m].
-        heading_noise_deg: Standard deviation of how it is turned [deg].
-        effects: Values of effects besides the robot's nominal ones, sorted by name.
-        folder: Where a user's own agents, effects and robots lie.
-        cautions: What is probably not meant in its robot or model, a sentence each.
-    """
-
-    robot: str
-    plant: str
-    camera: str
-    map: Road
-    seconds: float
-    position_noise_m: float
-    heading_noise_deg: float
-    effects: tuple[tuple[str, float], ...]
-    folder: Path
+    robot: str  # name of the robot
+    plant: str  # one of PLANTS
+    camera: str  # one of CAMERAS
+    map: Road  # the road, whether the package's or the user's own
+    seconds: float  # longest time an episode takes [s]
+    position_noise_m: float  # standard deviation of where the robot is put down [m]
+    heading_noise_deg: float  # standard deviation of how it is turned [deg]
+    effects: tuple[tuple[str, float], ...]  # values of effects besides the robot's nominal ones, sorted by name
+    folder: Path  # where a user's own agents, effects and robots lie
+    # what is probably not meant in its robot or model, a sentence each
     cautions: tuple[str, ...] = field(default=(), compare=False, repr=False)
 
     @property
@@ -179,19 +164,11 @@ class LaneFollowing:
         return len(self.map.starts)
 
     def check_agent(self, name: str) -> None:
-        """Load the agent once.
-
-        Raises:
-            SettingsError: If there is no such agent.
-        """
+        """Load the agent once."""
         self._agent(name)
 
     def run(self, episode: Episode) -> Mapping[str, float]:
-        """Drive one episode and score it.
-
-        Raises:
-            EpisodeError: With the time at which the agent failed.
-        """
+        """Drive one episode and score it."""
         return only(self.run_many([episode]))
 
     def run_many(self, episodes: Sequence[Episode]) -> list[Mapping[str, float] | EpisodeError]:
@@ -199,11 +176,7 @@ class LaneFollowing:
         return [_scored(self._metrics, driven) for driven in self.drive_many(episodes)]
 
     def record(self, episode: Episode) -> Recording:
-        """Drive one episode; its scores, the true pose at every tick, and the duties of both wheels.
-
-        Raises:
-            EpisodeError: With the time at which the agent failed.
-        """
+        """Drive one episode; its scores, the true pose at every tick, and the duties of both wheels."""
         driven = self.drive(episode)
         return Recording(self._metrics(driven.poses), *driven.columns(read_robot(self.robot, self.folder)))
 
@@ -244,20 +217,11 @@ class LaneFollowing:
         return self.seconds
 
     def demonstrate(self, episode: Episode, seconds: float) -> tuple[Demonstration, int]:
-        """Let the robot's expert drive for some time [s]; steps off the road are not worth imitating.
-
-        Raises:
-            SettingsError: If the robot has no expert.
-        """
+        """Let the robot's expert drive for some time [s]; steps off the road are not worth imitating."""
         return self._lesson(episode, None, seconds)
 
     def guide(self, episode: Episode, policy: Policy, seconds: float) -> tuple[Demonstration, int]:
-        """Let a policy drive for some time [s], and the robot's expert say what it would do at every step on the road.
-
-        Raises:
-            EpisodeError: If the policy raises or does not answer with two finite duties.
-            SettingsError: If the robot has no expert.
-        """
+        """Let a policy drive for some time [s], and the robot's expert say what it would do at every step."""
         return self._lesson(episode, policy, seconds)
 
     def _lesson(self, episode: Episode, policy: Policy | None, seconds: float) -> tuple[Demonstration, int]:
@@ -267,20 +231,11 @@ class LaneFollowing:
         return shown.memory.samples, round(seconds * robot.figures["control_rate"])
 
     def examine(self, episode: Episode, policy: Policy) -> float:
-        """The paper's driving score of a policy, from −`seconds` to `seconds`.
-
-        Raises:
-            EpisodeError: If the policy raises or does not answer with two finite duties.
-            SettingsError: If the robot does not state the distance between its wheels.
-        """
+        """The paper's driving score of a policy, from −`seconds` to `seconds`."""
         return self.examine_together([episode], policy)[0]
 
     def examine_together(self, episodes: Sequence[Episode], policy: Policy) -> list[float]:
-        """Score several episodes as `examine` does, to the bit.
-
-        Raises:
-            EpisodeError: As `examine` does, for the first episode that fails; SettingsError likewise.
-        """
+        """Score several episodes as `examine` does, to the bit; what the first that fails raises is raised."""
         wheels, pupil = read_robot(self.robot, self.folder).wheel_distance(), Pupil(policy)
         timed = functools.partial(driving_score, tick_s=1.0 / TICK_HZ, seconds=self.seconds)
         score = functools.partial(timed, self.map, wheel_distance=wheels)
@@ -312,7 +267,7 @@ class LaneFollowing:
         drivers: Sequence[Driver],
         seconds: float,
         *,
-        sees: Callable[[Picture, Signal], Any] = picture_only,
+        sees: Sees = picture_only,
         ended: Callable[[float, float], bool] | None = None,
     ) -> list[Drive | EpisodeError]:
         """Drive episodes side by side for some time [s], or until they have `ended`: off the map."""

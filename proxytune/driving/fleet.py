@@ -14,7 +14,6 @@ from typing import Any, ClassVar, Protocol, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from proxytune.driving.agent import Picture
 from proxytune.driving.bullet import BulletPlant
 from proxytune.driving.cameras import Views
 from proxytune.driving.episode import (
@@ -23,6 +22,7 @@ from proxytune.driving.episode import (
     Drive,
     Driver,
     Instance,
+    Sees,
     Shown,
     alike,
     ask_many,
@@ -30,6 +30,7 @@ from proxytune.driving.episode import (
     grouped,
     measured,
     picture_only,
+    show,
 )
 from proxytune.driving.expert import Pupil
 from proxytune.driving.optics import joined
@@ -50,12 +51,7 @@ class Fleet(Protocol):
     """Robots side by side, each on a floor of its own."""
 
     def move(self, twists: Signal, robots: Sequence[int], /) -> tuple[Signal, Sequence[bool]]:
-        """Let some robots follow their twists (robots, time, 3), each for one tick.
-
-        Returns:
-            Their poses after each tick (robots, time, 3), and whether each has hit something or fallen over.
-        """
-        ...
+        """The poses (robots, time, 3) that twists of some robots lead to, a tick each, and whether each has crashed."""
 
 
 @dataclass(frozen=True)
@@ -123,13 +119,9 @@ class _Apart:
 
 
 class _Band:
-    """Robots of a fleet that are of one domain instance.
+    """Robots of a fleet that are of one domain instance, by their numbers in it.
 
-    Attributes:
-        robots: Their numbers in the fleet.
-        here: Which of them are still under way.
-        rows: Where these are among the fleet's robots under way.
-        views: What their cameras show; None where nobody looks.
+    Those of them `here` are still under way, in these `rows` among the fleet's; `views` are None where nobody looks.
     """
 
     def __init__(self, instance: Instance, robots: Sequence[int], courses: Sequence[Course], *, blind: bool) -> None:
@@ -178,15 +170,9 @@ def _side_by_side(train: Drivetrain, seeds: tuple[int, ...], left: set[int]) -> 
 class Rollouts:
     """Episodes under way side by side, one control step after the other, all for the same time.
 
-    Attributes:
-        steps: How many commands there is time for.
-        hold: How many ticks each is held for.
-        under_way: The robots that are still driven, by their numbers.
-        here: The same as an index of arrays over all robots.
-        new_pictures: Whether they have new pictures since the last step.
-        poses: Theirs after each tick of the last step, (robots under way, ticks, 3): x [m], y [m], heading [rad];
-            before the first, the starts.
-        crashed: Whether each of them has hit something or fallen over.
+    There is time for so many `steps`; each command is held for `hold` ticks. The robots still driven are `under_way`,
+    and `here` in arrays over all. Their `poses` (robots, ticks, 3) are those after each tick of the last step,
+    before the first the starts; whether each has `crashed` then, or all have `new_pictures`, is told too.
     """
 
     def __init__(
@@ -260,23 +246,15 @@ def drive_fleet(
     fleet: Fleet,
     drivers: Sequence[Driver],
     courses: Sequence[Course],
-    sees: Callable[[Picture, Signal], Any] = picture_only,
+    sees: Sees = picture_only,
 ) -> list[Drive | EpisodeError]:
     """Drive robots side by side, each until the time is over, it crashes, its course ends or its driver fails.
 
-    Args:
-        instances: What bends each robot's commands, motion and pictures.
-        fleet: What moves, at the starts.
-        drivers: Who drives each.
-        courses: What each drives, all for the same time.
-        sees: What a driver is shown of the picture and the true pose; an expert's is `Sight`.
-
-    Returns:
-        Each robot's drive; an EpisodeError where its agent raised, or its answer was not two finite duties.
+    Courses are for the same time, the fleet is at their starts, and drivers are shown what `sees` makes of picture and
+    true pose (an expert's is `Sight`). Gives each robot's drive, or an EpisodeError where its driver failed.
     """
     control_hz = instances[0].robot.figures["control_rate"]
-    drives = _Drives(Rollouts(instances, courses, fleet), drivers, sees)
-    drives.begin([instance.robot for instance in instances])
+    drives = _Drives(Rollouts(instances, courses, fleet), drivers, [instance.robot for instance in instances], sees)
     for step in range(drives.rollouts.steps):
         drives.ask(step / control_hz)
         if not drives.drivers:
@@ -288,34 +266,31 @@ def drive_fleet(
 class _Drives:
     """Drives under way, in the rows of the robots under way, and the `results` of those that ended."""
 
-    def __init__(self, rollouts: Rollouts, drivers: Sequence[Driver], sees: Callable[[Picture, Signal], Any]) -> None:
+    def __init__(self, rollouts: Rollouts, drivers: Sequence[Driver], robots: Sequence[Robot], sees: Sees) -> None:
         self.rollouts, self.drivers, self._sees = rollouts, alike(drivers), sees
         self.results: list[Any] = [None] * len(drivers)
         self._groups = grouped(self.drivers)
         self._by_picture = all(isinstance(driver, Pupil) for driver in drivers)
-        self._memories: list[Any] = []
+        self._memories, problems = begin_all(self.drivers, robots)
         self._shown: Shown | None = None
         self._commands = np.zeros((len(drivers), 2))
         self._issued = np.empty((len(drivers), rollouts.steps, 2))
         self._poses = np.empty((len(drivers), rollouts.steps * rollouts.hold + 1, 3))
         self._poses[:, 0] = rollouts.poses[:, 0]
-
-    def begin(self, robots: Sequence[Robot]) -> None:
-        """Give every driver the memory it begins with."""
-        self._memories, problems = begin_all(self.drivers, robots)
         self._fail(problems)
 
     def ask(self, time_s: float) -> None:
         """Ask for the next commands; a policy that has seen the pictures before would answer the same."""
         if not self.drivers or (self._by_picture and not self.rollouts.new_pictures):
             return
+        see: Callable[[list[int]], Any] = self.rollouts.pictures
         if self._sees is not picture_only:
             sights = zip(self.rollouts.pictures(), self.rollouts.poses[:, -1], strict=True)
             seen = [self._sees(*one) for one in sights]
-            self._shown = Shown(self.drivers, lambda rows: [seen[row] for row in rows], self.rollouts.planes, ())
+            self._shown, see = [], lambda rows: [seen[row] for row in rows]
         elif self._shown is None or self.rollouts.new_pictures:
-            self._shown = Shown(self.drivers, self.rollouts.pictures, self.rollouts.planes, self._groups)
-        self._commands, self._memories, problems = ask_many(self.drivers, self._shown, self._memories, time_s)
+            self._shown = show(self.drivers, self.rollouts.planes, self._groups)
+        self._commands, self._memories, problems = ask_many(self.drivers, self._shown, see, self._memories, time_s)
         self._fail(problems)
 
     def step(self, number: int) -> None:
@@ -348,13 +323,7 @@ class _Drives:
         self._commands, self._shown = self._commands[rows], None
 
 
-def drive(
-    instance: Instance,
-    plant: Plant,
-    driver: Driver,
-    course: Course,
-    sees: Callable[[Picture, Signal], Any] = picture_only,
-) -> Drive:
+def drive(instance: Instance, plant: Plant, driver: Driver, course: Course, sees: Sees = picture_only) -> Drive:
     """Drive one robot as `drive_fleet` drives several.
 
     Raises:
@@ -374,15 +343,8 @@ def only(results: Sequence[Result | EpisodeError]) -> Result:
 def follow(instance: Instance, plant: Plant, start: Signal, duties: Signal, seed: int) -> Signal:
     """Drive commands on open floor.
 
-    Args:
-        instance: Whose effects bend commands, motion and measurement.
-        plant: What moves, at its start.
-        start: That start (3,): x [m], y [m], heading [rad].
-        duties: Commands (rows, 2), one per control step.
-        seed: Of everything random in the effects.
-
-    Returns:
-        The measured pose at each command (rows, 3).
+    They are duties (rows, 2), one per control step, bent by an instance's effects, which draw by the seed; the plant
+    is at the start (3,). Gives the measured pose at each command (rows, 3).
     """
     course = Course(start, 0.0, seed, lambda x, y: False)
     rollouts, poses = Rollouts([instance], [course], Plants([plant]), blind=True), [start[None]]

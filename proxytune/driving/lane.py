@@ -22,41 +22,23 @@ PICOMETRE = 12
 
 
 class RoadLayout(NamedTuple):
-    """The sections of a road in their order, one in each entry of the arrays.
+    """The sections of a road in their order, one in each entry of the arrays."""
 
-    Attributes:
-        normal: Direction away from the pivot along the straight, from 0 to 2π [rad].
-        side: 1 where the bend is to the left, −1 where it is to the right.
-        radius: Of the bend [m], 0 where there is none.
-        turn: Of the bend, positive to either side [rad].
-        pivot: How far the pivot lies from the origin in the direction of `normal` [m].
-        first: How far the straight's beginning lies from the origin in the straight's direction [m].
-        last: How far its end does [m].
-        straights: Length of the straights of earlier sections [m].
-        turned: Turn of those earlier bends that are as this section's [rad]: as one product, their length rounds once.
-        other_arcs: Length of the other earlier bends [m].
-        other_turns: Their signed turn [rad].
-        across: Unit vectors of `normal`, (sections, 2).
-        along: Unit vectors of the straights' directions, (sections, 2).
-        origin: Point of the map that repeats of the road turn about, x and y [m].
-        repeats: How many times the road repeats its first sections to close, 1 where it does not.
-    """
-
-    normal: Floats
-    side: Floats
-    radius: Floats
-    turn: Floats
-    pivot: Floats
-    first: Floats
-    last: Floats
-    straights: Floats
-    turned: Floats
-    other_arcs: Floats
-    other_turns: Floats
-    across: Floats
-    along: Floats
-    origin: Floats
-    repeats: int
+    normal: Floats  # direction away from the pivot along the straight, from 0 to 2π [rad]
+    side: Floats  # 1 where the bend is to the left, −1 where it is to the right
+    radius: Floats  # of the bend [m], 0 where there is none
+    turn: Floats  # of the bend, positive to either side [rad]
+    pivot: Floats  # how far the pivot lies from the origin in the direction of `normal` [m]
+    first: Floats  # how far the straight's beginning lies from the origin in the straight's direction [m]
+    last: Floats  # how far its end does [m]
+    straights: Floats  # length of the straights of earlier sections [m]
+    turned: Floats  # turn of the earlier bends that are as this section's [rad]: one product, whose length rounds once
+    other_arcs: Floats  # length of the other earlier bends [m]
+    other_turns: Floats  # their signed turn [rad]
+    across: Floats  # unit vectors of `normal`, (sections, 2)
+    along: Floats  # unit vectors of the straights' directions, (sections, 2)
+    origin: Floats  # point of the map that repeats of the road turn about, x and y [m]
+    repeats: int  # how many times the road repeats its first sections to close, 1 where it does not
 
 
 @functools.lru_cache
@@ -121,21 +103,13 @@ BEYOND = 1e-12
 
 
 class NearestPoints(NamedTuple):
-    """The nearest points of the centre line, each field of shape (…).
+    """The nearest points of the centre line, each field of shape (…)."""
 
-    Attributes:
-        section: Number of the section it lies on.
-        straight: How far from the origin it lies in the direction of the section's straight [m].
-        turned: How much of the section's bend lies behind it [rad].
-        normal: Direction away from the section's pivot there [rad].
-        outside: Signed distance from the centre line, away from the pivot positive [m].
-    """
-
-    section: Numbers
-    straight: Floats
-    turned: Floats
-    normal: Floats
-    outside: Floats
+    section: Numbers  # number of the section it lies on
+    straight: Floats  # how far from the origin it lies in the direction of the section's straight [m]
+    turned: Floats  # how much of the section's bend lies behind it [rad]
+    normal: Floats  # direction away from the section's pivot there [rad]
+    outside: Floats  # signed distance from the centre line, away from the pivot positive [m]
 
 
 def find_nearest(layout: RoadLayout, positions: Floats) -> NearestPoints:
@@ -152,14 +126,9 @@ def find_nearest(layout: RoadLayout, positions: Floats) -> NearestPoints:
 
 
 def way_round(layout: RoadLayout, section: Numbers, straight: Floats, turned: Floats, offset: Floats) -> Floats:
-    """Way round the map to a point of a line beside the centre line, counter-clockwise [m].
+    """Way round the map, counter-clockwise [m], to a point of the line that is `offset` right of the centre line [m].
 
-    Args:
-        layout: Of the road.
-        section: Number of the section it lies on.
-        straight: How far from the origin it lies in the direction of the section's straight [m].
-        turned: How much of the section's bend lies behind it [rad].
-        offset: How far right of the centre line that line is [m].
+    Section, straight and turned are that point's as `NearestPoints` has them.
     """
     edges = layout.straights[section] + straight - layout.first[section]
     others = layout.other_arcs[section] + offset * layout.other_turns[section]
@@ -172,21 +141,13 @@ def bend_radius(layout: RoadLayout, section: Numbers, offset: Floats) -> Floats:
 
 
 class _View(NamedTuple):
-    """Places as seen from a section's pivot, each field of shape (…).
+    """Places as seen from a section's pivot, each field of shape (…)."""
 
-    Attributes:
-        out: How far they are from the pivot across the straight [m].
-        straight: How far from the origin the straight's nearest point lies in its direction [m].
-        past: How far they are ahead of that point in the same direction [m].
-        in_bend: Whether the bend is nearer than the straight.
-        outside: Signed distance from the section gone on with past its ends, away from the pivot positive [m].
-    """
-
-    out: Floats
-    straight: Floats
-    past: Floats
-    in_bend: Flags
-    outside: Floats
+    out: Floats  # how far they are from the pivot across the straight [m]
+    straight: Floats  # how far from the origin the straight's nearest point lies in its direction [m]
+    past: Floats  # how far they are ahead of that point in the same direction [m]
+    in_bend: Flags  # whether the bend is nearer than the straight
+    outside: Floats  # signed distance from the section gone on with past its ends, away from the pivot positive [m]
 
 
 def _view(layout: RoadLayout, section: Numbers, places: Floats) -> _View:
@@ -213,19 +174,12 @@ def _nearest_section(layout: RoadLayout, places: Floats) -> Numbers:
 
 
 class LanePose(NamedTuple):
-    """Poses as seen from the lanes they are in, each field of shape (…).
+    """Poses as seen from the lanes they are in, each field of shape (…)."""
 
-    Attributes:
-        counter_clockwise: Whether it is the outer lane (right-hand traffic), else the inner, clockwise one.
-        along: Arc length along that lane's centre line in its direction [m], from 0 to its length.
-        deviation: Distance from that centre line [m], positive to the left of travel.
-        heading_error: Heading less the lane's direction [rad], from −π/2 to π/2, positive to the left.
-    """
-
-    counter_clockwise: Flags
-    along: Floats
-    deviation: Floats
-    heading_error: Floats
+    counter_clockwise: Flags  # whether it is the outer lane (right-hand traffic), else the inner, clockwise one
+    along: Floats  # arc length along that lane's centre line in its direction [m], from 0 to its length
+    deviation: Floats  # distance from that centre line [m], positive to the left of travel
+    heading_error: Floats  # heading less the lane's direction [rad], from −π/2 to π/2, positive to the left
 
 
 def lane_length(road: Road, counter_clockwise: Flags | bool) -> Floats:
@@ -239,12 +193,8 @@ def lane_pose(road: Road, positions: Floats, headings: Floats) -> LanePose:
 
     What counts is the centre line's nearest point, so every finite pose has a finite answer, off the map too.
     The deviation from either lane is continuous everywhere; along and heading error jump only
-    where two parts of the road are equally near.
-
-    Args:
-        road: The map.
-        positions: x and y [m], shape (…, 2).
-        headings: Counter-clockwise from the x axis [rad], shape (…).
+    where two parts of the road are equally near. Positions are x and y [m] (…, 2), headings counter-clockwise from the
+    x axis [rad] (…).
     """
     layout = lay_out(road.begin, road.segments)
     near = find_nearest(layout, positions)
@@ -262,21 +212,14 @@ def lane_pose(road: Road, positions: Floats, headings: Floats) -> LanePose:
 
 
 def lane_point(road: Road, counter_clockwise: Flags | bool, along: Floats | float) -> Floats:
-    """Point of a lane's centre line after so much of a lap: `lane_pose` the other way round.
+    """Point of a lane's centre line after so much of a lap, x and y [m] (…, 2): `lane_pose` the other way round.
 
-    Args:
-        road: The map.
-        counter_clockwise: Whether it is the outer lane, else the inner one.
-        along: Arc length in the lane's direction [m], shape (…); whole laps make no difference.
-
-    Returns:
-        x and y [m], shape (…, 2).
+    It is `along` the outer lane, or the inner one, in its direction [m] (…); whole laps make no difference.
     """
     layout, offset = lay_out(road.begin, road.segments), _offset(road, counter_clockwise)
     part = len(layout.side) // layout.repeats
-    repeat, past = np.divmod(
-        np.where(counter_clockwise, along, -np.asarray(along)), _way_to_end(layout, part - 1, offset)
-    )
+    way = np.where(counter_clockwise, along, -np.asarray(along))
+    repeat, past = np.divmod(way, _way_to_end(layout, part - 1, offset))
     section = np.sum([past >= _way_to_end(layout, number, offset) for number in range(part - 1)], axis=0, dtype=int)
     past = past - way_round(layout, section, layout.first[section], np.zeros(()), offset)
     radius, straight = bend_radius(layout, section, offset), layout.last[section] - layout.first[section]

@@ -5,7 +5,8 @@ By Numba where that pays, else by NumPy, to the same bit, so that which one is t
 
 import functools
 import sys
-from typing import Any, NamedTuple, Protocol, cast
+from types import ModuleType
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,23 +26,14 @@ RIDGE = 0.005
 
 
 class TexelTable(NamedTuple):
-    """For each of a camera's pixels, a point in the robot's frame and a square of texels that shows it.
+    """For each of a camera's pixels, a point in the robot's frame and a square of texels that shows it."""
 
-    Attributes:
-        plane: The point and 1, in texels a metre, (3, pixels): x ahead, y to the left, 1.
-        begin: The first column and row of the pixel's square, 0, (pixels,).
-        last: The last column and row of the pixel's square, (pixels,).
-        first: Index of the first texel of that square, (pixels,).
-        side: Texels along its side, (pixels,).
-        texels: All squares one after another, (texels,): red, green, blue and a spare byte in one number each.
-    """
-
-    plane: NDArray[np.float32]
-    begin: NDArray[np.float32]
-    last: NDArray[np.float32]
-    first: NDArray[np.int32]
-    side: NDArray[np.int32]
-    texels: NDArray[np.uint32]
+    plane: NDArray[np.float32]  # the point and 1, in texels a metre, (3, pixels): x ahead, y to the left, 1
+    begin: NDArray[np.float32]  # the first column and row of the pixel's square, 0, (pixels,)
+    last: NDArray[np.float32]  # the last column and row of the pixel's square, (pixels,)
+    first: NDArray[np.int32]  # index of the first texel of that square, (pixels,)
+    side: NDArray[np.int32]  # texels along its side, (pixels,)
+    texels: NDArray[np.uint32]  # all squares one after another: red, green, blue and a spare byte in one number each
 
     def without(self, pixels: int) -> "TexelTable":
         """The same but for the first pixels."""
@@ -94,35 +86,21 @@ def expose(table: TexelTable, places: Places, weights: NDArray[np.float32], plan
 
 
 class Eyes(NamedTuple):
-    """The parts of pictures that robots look at for markings, and what they take for one.
+    """The parts of pictures that robots look at for markings, and what they take for one."""
 
-    Attributes:
-        ahead: How far ahead of the axle the floor lies that the nominal camera sees there [m], (eyes, pixels).
-        left: How far to the left [m], (eyes, pixels).
-        eye: Which eye each robot has, (robots,).
-        yellow: More is the yellow line, (robots, pixels); 255 where it does not look.
-        white: More is the white line, (robots, pixels); 255 where it does not look.
-    """
-
-    ahead: Floats
-    left: Floats
-    eye: Whole
-    yellow: NDArray[np.uint8]
-    white: NDArray[np.uint8]
+    ahead: Floats  # how far ahead of the axle the floor lies that the nominal camera sees there [m], (eyes, pixels)
+    left: Floats  # how far to the left [m], (eyes, pixels)
+    eye: Whole  # which eye each robot has, (robots,)
+    yellow: NDArray[np.uint8]  # more is the yellow line, (robots, pixels); 255 where it does not look
+    white: NDArray[np.uint8]  # more is the white line, (robots, pixels); 255 where it does not look
 
 
 def find_lanes(eyes: Eyes, yellow: NDArray[np.uint8], bright: NDArray[np.uint8]) -> Floats:
     """Fit a line through the lane's centre, right of the yellow line and left of the white one, by least squares.
 
-    White pixels to the left of the yellow ones belong to the other lane's edge and are left out.
-
-    Args:
-        eyes: Where and how the robots look.
-        yellow: How yellow what they see is, (robots, pixels).
-        bright: How bright, (robots, pixels).
-
-    Returns:
-        Offset [m], slope and number of pixels, (robots, 3); where these are fewer than FEWEST, they alone count.
+    White pixels to the left of the yellow ones belong to the other lane's edge and are left out. Of how yellow and how
+    bright what they see is (robots, pixels), it makes offset [m], slope and number of pixels, (robots, 3); where these
+    are fewer than FEWEST, they alone count.
     """
     lanes = np.zeros((len(yellow), 3))
     golden, shining = yellow > eyes.yellow, bright > eyes.white
@@ -144,28 +122,16 @@ def find_lanes(eyes: Eyes, yellow: NDArray[np.uint8], bright: NDArray[np.uint8])
     return lanes
 
 
-class Loops(Protocol):
-    """A way to go through them: this module, or the compiled one."""
-
-    def expose(self, table: TexelTable, places: Places, weights: NDArray[np.float32], planes: NDArray[Any]) -> None:
-        """Write what robots see as the ends of planes (n, 3, pixels): means over their places (n · times, 6)."""
-        ...
-
-    def find_lanes(self, eyes: Eyes, yellow: NDArray[np.uint8], bright: NDArray[np.uint8]) -> Floats:
-        """Offset [m], slope and number of pixels of lines through the lane's centre, (robots, 3)."""
-        ...
-
-
-def fastest(pictures: int) -> Loops:
-    """The way that takes least time for some more pictures, loading included: asked anew for every use."""
+def fastest(pictures: int) -> ModuleType:
+    """The way that takes least time for some more pictures, loading included: this module, or the compiled one."""
     _used[0] += pictures
     return by_numba() if _used[0] > PAYS_OFF else _BY_NUMPY
 
 
 @functools.cache
-def by_numba() -> Loops:
+def by_numba() -> ModuleType:
     """The compiled way where it works, else that of NumPy."""
-    return cast(Loops, compiled_loops("proxytune.driving.compiled") or _BY_NUMPY)
+    return compiled_loops("proxytune.driving.compiled") or _BY_NUMPY
 
 
-_BY_NUMPY = cast(Loops, sys.modules[__name__])
+_BY_NUMPY = sys.modules[__name__]

@@ -20,36 +20,22 @@ SKY = (115, 209, 255)
 class CameraFigures:
     """Figures of how a camera is made and mounted.
 
-    Attributes:
-        columns: Width of a picture [pixel].
-        rows: Height of a picture [pixel].
-        forward_m: How far the lens is ahead of the axle [m].
-        pitch_deg: How far it looks down [deg].
-        roll_deg: How far it is tilted clockwise in the driver's view [deg].
-        yaw_deg: How far it looks to the left [deg].
-        height_m: Height of the lens above the floor [m].
-        field_of_view_deg: Vertical field of view of the lens without distortion [deg].
-        k1: Radial distortion, plumb-bob model; below zero is a barrel.
-        centre_right: How far right of the picture's middle the lens' axis meets it, as a share of the picture's height.
-        centre_down: How far below the middle it does, in the same way.
-        aspect: Horizontal focal length over the vertical one; above 1 things look wider than they are.
-
     Raises:
         SettingsError: If no camera can have these figures.
     """
 
-    columns: int
-    rows: int
-    forward_m: float
-    pitch_deg: float
-    roll_deg: float
-    yaw_deg: float
-    height_m: float
-    field_of_view_deg: float
-    k1: float
-    centre_right: float = 0.0
-    centre_down: float = 0.0
-    aspect: float = 1.0
+    columns: int  # width of a picture [pixel]
+    rows: int  # height of a picture [pixel]
+    forward_m: float  # how far the lens is ahead of the axle [m]
+    pitch_deg: float  # how far it looks down [deg]
+    roll_deg: float  # how far it is tilted clockwise in the driver's view [deg]
+    yaw_deg: float  # how far it looks to the left [deg]
+    height_m: float  # height of the lens above the floor [m]
+    field_of_view_deg: float  # vertical field of view of the lens without distortion [deg]
+    k1: float  # radial distortion, plumb-bob model; below zero is a barrel
+    centre_right: float = 0.0  # how far right of the picture's middle the lens' axis is, as a share of its height
+    centre_down: float = 0.0  # how far below the middle it does, in the same way
+    aspect: float = 1.0  # horizontal focal length over the vertical one; above 1 things look wider than they are
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
@@ -83,7 +69,6 @@ class Renderer(Protocol):
 
     def render(self, poses: NDArray[np.floating[Any]]) -> NDArray[np.uint8]:
         """Render what it sees from poses (n, 3) of x [m], y [m], heading [rad]: (n, rows, columns, 3) RGB."""
-        ...
 
 
 def parted(pictures: NDArray[Any]) -> NDArray[Any]:
@@ -115,15 +100,10 @@ def floor_hits(figures: CameraFigures, right: float, down: float) -> NDArray[np.
 
 
 def floor_points(figures: CameraFigures, columns: NDArray[Any], rows: NDArray[Any]) -> NDArray[np.float64]:
-    """Points of the floor at which any points of the picture look, in the robot's frame.
+    """Points of the floor (…, 2) at which any places (…) in the picture look, from its left and upper edge [pixel].
 
-    Args:
-        figures: Of the camera.
-        columns: Places (…) from the picture's left edge [pixel]; the first pixel's middle is at 0.5.
-        rows: Places (…) from its upper edge [pixel].
-
-    Returns:
-        Shape (…, 2): x ahead of the axle and y to the left [m]; NaN at and above the horizon.
+    The first pixel's middle is at 0.5. Points are x ahead of the axle and y to the left [m]; NaN at and above the
+    horizon.
     """
     rays = lens_rays(figures, columns, rows)
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -21,34 +21,21 @@ from proxytune.driving.robot import Robot
 
 
 class Lane(NamedTuple):
-    """A straight line through the lane's centre in the robot's frame: left(x) = offset + slope · x.
+    """A straight line through the lane's centre in the robot's frame: left(x) = offset + slope · x."""
 
-    Attributes:
-        offset: How far to the left of the axle's middle the lane's centre lies [m].
-        slope: Tangent of the lane's direction, positive to the left.
-        pixels: How many pixels say so.
-    """
-
-    offset: float
-    slope: float
-    pixels: int
+    offset: float  # how far to the left of the axle's middle the lane's centre lies [m]
+    slope: float  # tangent of the lane's direction, positive to the left
+    pixels: int  # how many pixels say so
 
 
 @dataclass(frozen=True, eq=False)
 class Eye:
-    """The part of the picture that the nominal camera takes for nearby floor.
+    """The part of the picture that the nominal camera takes for nearby floor."""
 
-    Attributes:
-        first: The pixels from here on are looked at.
-        ahead: How far ahead of the axle each of them lies [m], NaN beyond reach.
-        left: How far to the left [m].
-        near: Whether it lies within reach.
-    """
-
-    first: int
-    ahead: Floats
-    left: Floats
-    near: Flags
+    first: int  # the pixels from here on are looked at
+    ahead: Floats  # how far ahead of the axle each of them lies [m], NaN beyond reach
+    left: Floats  # how far to the left [m]
+    near: Flags  # whether it lies within reach
 
 
 @functools.lru_cache
@@ -119,17 +106,11 @@ Kind = Callable[[Seen, tuple[Any, ...], Sequence[int]], list[Any]]
 
 
 class Markings(NamedTuple):
-    """A look at the markings on the floor.
+    """A look at the markings on the floor."""
 
-    Attributes:
-        eye: The part of the picture that is looked at.
-        contrast: Red and green of the dashed centre line are brighter than blue by more than this (0 to 255).
-        brightness: Every colour of the solid edge lines is brighter than this (0 to 255).
-    """
-
-    eye: Eye
-    contrast: float = math.inf
-    brightness: float = math.inf
+    eye: Eye  # the part of the picture that is looked at
+    contrast: float = math.inf  # red and green of the dashed centre line are brighter than blue by more (0 to 255)
+    brightness: float = math.inf  # every colour of the solid edge lines is brighter than this (0 to 255)
 
 
 @functools.lru_cache(maxsize=8)
@@ -164,21 +145,13 @@ def count_yellow(seen: Seen, looks: tuple[Markings, ...], robots: Sequence[int])
 
 @dataclass(frozen=True, eq=False)
 class Lower:
-    """The lower part of a picture.
+    """The lower part of a picture."""
 
-    Attributes:
-        first_row: The rows from here on.
-        first: The pixels from here on.
-        yellow: More is yellow, and on the right or in the middle, (pixels,).
-        white: More is white, and on the right, (pixels,).
-        pull: How near to the picture's middle each is, from −1 to 1, on the left below zero; from the second column on.
-    """
-
-    first_row: int
-    first: int
-    yellow: NDArray[np.uint8]
-    white: NDArray[np.uint8]
-    pull: Floats
+    first_row: int  # the rows from here on
+    first: int  # the pixels from here on
+    yellow: NDArray[np.uint8]  # more is yellow, and on the right or in the middle, (pixels,)
+    white: NDArray[np.uint8]  # more is white, and on the right, (pixels,)
+    pull: Floats  # how near to the picture's middle each is, from −1 to 1, on the left below zero; from column 1 on
 
 
 @functools.lru_cache
@@ -186,11 +159,10 @@ def lower_part(rows: int, columns: int, share: float) -> Lower:
     """The part of a picture below a share of its height."""
     first = int(share * rows)
     side = np.repeat(np.linspace(-1.0, 1.0, columns)[None, :], rows - first, axis=0)
-    yellow, white = np.where(side > -0.35, 60, 255), np.where(side >= 0.35, 150, 255)
+    levels = np.where(side > -0.35, 60, 255), np.where(side >= 0.35, 150, 255)
+    yellow, white = (level.astype(np.uint8).ravel() for level in levels)
     pull = np.sign(side) * (1.0 - np.abs(side))
-    return Lower(
-        first, first * columns, yellow.astype(np.uint8).ravel(), white.astype(np.uint8).ravel(), pull[:, 1:].copy()
-    )
+    return Lower(first, first * columns, yellow, white, pull[:, 1:].copy())
 
 
 def weigh_markings(seen: Seen, looks: tuple[Lower, ...], robots: Sequence[int]) -> list[tuple[float, float]]:

@@ -34,7 +34,6 @@ class Plant(Protocol):
             The poses after each tick, (time, 3): x [m], y [m] of the middle of the axle, heading [rad, unwrapped];
             and whether the robot has hit something or fallen over.
         """
-        ...
 
     def __enter__(self) -> Self: ...
 
@@ -69,9 +68,8 @@ class Drivetrain:
     def begin(self, context: FilterContext) -> DrivetrainState:
         """Begin as if the resting command of `context` had been given for ever."""
         still = np.zeros((*np.shape(context.rest)[:-1], len(CHANNELS[Stage.MOTION])))
-        return DrivetrainState(
-            self.command.begin(context), self.actuation.begin(context), self.motion.begin(replace(context, rest=still))
-        )
+        motion = self.motion.begin(replace(context, rest=still))
+        return DrivetrainState(self.command.begin(context), self.actuation.begin(context), motion)
 
     def apply(self, signal: Signal, memory: DrivetrainState) -> tuple[Signal, DrivetrainState]:
         """The twists that the next chunk of duties leads to."""
@@ -123,38 +121,23 @@ ACROSS = 0.9
 
 @dataclass(frozen=True)
 class Wheel:
-    """A driven wheel.
+    """A driven wheel."""
 
-    Attributes:
-        joint: Name of its joint.
-        centre: Where it is in the root link's frame (3,) [m].
-        axis: Direction of its axle there (3,).
-        radius_m: Its radius [m]; None where its geometry is a mesh.
-        effort: The most that its motor gives [N m]; 0 where that is not said.
-    """
-
-    joint: str
-    centre: Floats
-    axis: Floats
-    radius_m: float | None
-    effort: float
+    joint: str  # name of its joint
+    centre: Floats  # where it is in the root link's frame (3,) [m]
+    axis: Floats  # direction of its axle there (3,)
+    radius_m: float | None  # its radius [m]; None where its geometry is a mesh
+    effort: float  # the most that its motor gives [N m]; 0 where that is not said
 
 
 @dataclass(frozen=True)
 class Body:
-    """A URDF's two driven wheels, its mass and its camera.
+    """A URDF's two driven wheels, its mass and its camera."""
 
-    Attributes:
-        left: The left wheel.
-        right: The right wheel.
-        mass_kg: Of all its links [kg].
-        camera: The pose of a link called camera in the root link's frame (4, 4); None where there is none.
-    """
-
-    left: Wheel
-    right: Wheel
-    mass_kg: float
-    camera: Floats | None
+    left: Wheel  # the left wheel
+    right: Wheel  # the right wheel
+    mass_kg: float  # of all its links [kg]
+    camera: Floats | None  # the pose of a link called camera in the root link's frame (4, 4); None where there is none
 
     @property
     def wheel_distance(self) -> float:
@@ -336,16 +319,7 @@ def _radius(root: ET.Element, link: str) -> float | None:
 
 
 def integrate(start: Signal, twists: Signal, tick_s: float) -> Signal:
-    """The poses after each tick.
-
-    Args:
-        start: Starting poses (…, 3): x [m], y [m], heading [rad].
-        twists: Twists (…, time, 3), each held for a tick.
-        tick_s: Length of a tick [s].
-
-    Returns:
-        Poses (…, time, 3), headings unwrapped.
-    """
+    """The poses (…, time, 3) after ticks so long [s] from a start (…, 3), each with a twist; headings unwrapped."""
     turns = twists[..., 2] * tick_s
     headings = start[..., None, 2] + turns.cumsum(axis=-1)
     middles = headings - turns / 2.0

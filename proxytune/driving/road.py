@@ -73,50 +73,27 @@ def length(segments: tuple[Segment, ...]) -> float:
 
 @dataclass(frozen=True)
 class Paint:
-    """Markings of a road.
+    """Markings of a road."""
 
-    Attributes:
-        white_width: Width of the solid white edge lines [m].
-        yellow_width: Width of the dashed yellow centre line [m].
-        bend_radius: Radius of the yellow line in bends [m], which may be tighter than the road's; None where it is
-            not. The lanes as they are scored follow the road's own radius.
-        straight_dash: About how long a yellow dash on a straight is [m].
-        bend_dash: About how long one in a bend is [m].
-        tape_m: Standard deviation of where a line lies from where the map has it [m]; no episode depends on it.
-    """
-
-    white_width: float
-    yellow_width: float
-    bend_radius: float | None
-    straight_dash: float
-    bend_dash: float
-    tape_m: float = field(default=0.005, repr=False)
+    white_width: float  # width of the solid white edge lines [m]
+    yellow_width: float  # width of the dashed yellow centre line [m]
+    bend_radius: float | None  # of the yellow line in bends [m], tighter than the lanes as scored; None where it is not
+    straight_dash: float  # about how long a yellow dash on a straight is [m]
+    bend_dash: float  # about how long one in a bend is [m]
+    tape_m: float = field(default=0.005, repr=False)  # deviation of where lines lie [m]; no episode depends on it
 
 
 @dataclass(frozen=True)
 class Road:
-    """A map with one closed road of two lanes, right-hand traffic, asphalt all over.
+    """A map with one closed road of two lanes, right-hand traffic, asphalt all over."""
 
-    Attributes:
-        name: What `[domain] map` calls it.
-        description: What it is, in one line.
-        size: Of the map along x and y [m]; its bottom-left corner is the origin.
-        begin: Where the first segment begins: x [m], y [m], heading [deg].
-        segments: The road's centre line, counter-clockwise round what it encloses.
-        width: Between the outer edges of the white lines [m].
-        lane_offset: Distance of a lane's centre line from the road's [m].
-        lane_width: Width of a lane [m].
-        paint: How it is marked.
-        starts: Starting poses (x [m], y [m], heading [deg]).
-    """
-
-    name: str
-    description: str
-    size: tuple[float, float]
-    begin: tuple[float, float, float]
-    segments: tuple[Segment, ...]
-    width: float
-    lane_offset: float
-    lane_width: float
-    paint: Paint
-    starts: tuple[tuple[float, float, float], ...]
+    name: str  # what `[domain] map` calls it
+    description: str  # what it is, in one line
+    size: tuple[float, float]  # of the map along x and y [m]; its bottom-left corner is the origin
+    begin: tuple[float, float, float]  # where the first segment begins: x [m], y [m], heading [deg]
+    segments: tuple[Segment, ...]  # the road's centre line, counter-clockwise round what it encloses
+    width: float  # between the outer edges of the white lines [m]
+    lane_offset: float  # distance of a lane's centre line from the road's [m]
+    lane_width: float  # width of a lane [m]
+    paint: Paint  # how it is marked
+    starts: tuple[tuple[float, float, float], ...]  # starting poses (x [m], y [m], heading [deg])

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from proxytune.arrays import Floats
-from proxytune.driving.lane import RoadLayout, find_nearest, lay_out, unit, way_round
+from proxytune.driving.lane import NearestPoints, find_nearest, lay_out, unit, way_round
 from proxytune.driving.road import Paint, Road, Segment, Straight, length, tightened
 
 PIXELS_PER_METRE = 400
@@ -33,17 +33,11 @@ DASH_PER_GAP = 2.0
 
 @dataclass(frozen=True, eq=False)
 class Floor:
-    """A floor seen from above.
+    """A floor seen from above."""
 
-    Attributes:
-        pixels: Shape (side, side, 3), uint8; rows go up with y, columns with x.
-        pixels_per_metre: Resolution.
-        origin: Where the corner of the first pixel lies, both in x and in y [m].
-    """
-
-    pixels: NDArray[np.uint8]
-    pixels_per_metre: float
-    origin: float
+    pixels: NDArray[np.uint8]  # shape (side, side, 3), uint8; rows go up with y, columns with x
+    pixels_per_metre: float  # resolution
+    origin: float  # where the corner of the first pixel lies, both in x and in y [m]
 
 
 @functools.lru_cache
@@ -57,7 +51,7 @@ def draw_floor(road: Road) -> Floor:
     side = MARGIN * math.ceil(longest * PIXELS_PER_METRE / MARGIN + 2.0)
     origin = (longest - side / PIXELS_PER_METRE) / 2.0
     places = origin + (np.arange(side) + 0.5) / PIXELS_PER_METRE
-    paint = functools.partial(_paint, road, painted(road))
+    paint = functools.partial(_paint, Markings(road))
     strips = [paint(np.stack(np.meshgrid(places, rows), axis=-1)) for rows in places.reshape(-1, STRIP)]
     return Floor(np.concatenate(strips), PIXELS_PER_METRE, origin)
 
@@ -67,47 +61,13 @@ def painted(road: Road) -> list[tuple[Segment, ...]]:
     return [tightened(segment, road.paint.bend_radius) for segment in road.segments]
 
 
-def _paint(road: Road, stretches: list[tuple[Segment, ...]], positions: Floats) -> NDArray[np.uint8]:
+def _paint(markings: "Markings", positions: Floats) -> NDArray[np.uint8]:
     """The colours (rows, columns, 3) of positions (rows, columns, 2) [m]."""
     picture = np.tile(np.array(COLOURS["off_map"], dtype=float), (*positions.shape[:-1], 1))
-    for colour, distance in _shapes(road, stretches, positions).items():
+    for colour, distance in markings.shapes(positions).items():
         cover = np.clip(0.5 - distance * PIXELS_PER_METRE, 0.0, 1.0)[..., None]
         picture += cover * (np.array(COLOURS[colour]) - picture)
     return np.asarray(np.rint(picture), dtype=np.uint8)
-
-
-def _shapes(road: Road, stretches: list[tuple[Segment, ...]], positions: Floats) -> dict[str, Floats]:
-    """Signed distance from what is painted in each colour, inside negative [m], the lowest layer first."""
-    layout = lay_out(road.begin, tuple(part for stretch in stretches for part in stretch))
-    near = find_nearest(layout, positions)
-    aside, half = np.abs(near.outside), np.array(road.size) / 2.0
-    along = way_round(layout, near.section, near.straight, near.turned, np.zeros(()))
-    middle = (road.width - road.paint.white_width) / 2.0
-    return {
-        "asphalt": (np.abs(positions - half) - half).max(axis=-1),
-        "white": np.abs(aside - middle) - road.paint.white_width / 2.0,
-        "yellow": np.maximum(aside - road.paint.yellow_width / 2.0, _dash_distance(road, stretches, along)),
-    }
-
-
-def _dash_distance(road: Road, stretches: list[tuple[Segment, ...]], along: Floats) -> Floats:
-    """Signed distance along the centre line from the nearest dash [m]."""
-    sizes, ends, dashes = _lengths_and_dashes(road, stretches)
-    stretch = np.clip(np.searchsorted(ends, along, side="right"), 0, len(ends) - 1)
-    within, size, count = along - (ends - sizes)[stretch], sizes[stretch], dashes[stretch]
-    # The dashes share a stretch's length evenly, a gap at either end
-    gap = size / (count * (DASH_PER_GAP + 1.0) + 1.0)
-    period = gap * (DASH_PER_GAP + 1.0)
-    first = gap + gap * DASH_PER_GAP / 2.0
-    nearest = np.clip(np.rint((within - first) / period), 0, count - 1)
-    return np.asarray(np.abs(within - first - nearest * period) - gap * DASH_PER_GAP / 2.0)
-
-
-def _lengths_and_dashes(road: Road, stretches: list[tuple[Segment, ...]]) -> tuple[Floats, Floats, NDArray[np.int_]]:
-    """How long each stretch is, how far round it ends [m], and how many dashes it has."""
-    sizes = np.array([length(stretch) for stretch in stretches])
-    pairs = zip(road.segments, sizes, strict=True)
-    return sizes, np.cumsum(sizes), np.array([dashes_on(road.paint, segment, float(size)) for segment, size in pairs])
 
 
 def dashes_on(paint: Paint, segment: Segment, size: float) -> int:
@@ -121,25 +81,14 @@ LINES = ("left white line", "right white line", "yellow line", "yellow dashes")
 
 
 class Marks(NamedTuple):
-    """The nearest marking to each of n places.
+    """The nearest marking to each of n places."""
 
-    Attributes:
-        distance: Signed distance from its edge, inside negative (n,) [m]; from a dash's end along the centre line, as
-            it is painted.
-        slope: Unit vector in which the distance grows (n, 2).
-        stretch: Which of the road's segments it is on (n,).
-        line: Which of LINES it is (n,); the ends of dashes are the last.
-        side: Whether the nearest edge moves away (1) or closer (−1) as the marking moves right, or on, seen by a robot
-            that drives counter-clockwise (n,).
-        share: How much of the stretch lies behind, from 0 to 1 (n,).
-    """
-
-    distance: Floats
-    slope: Floats
-    stretch: NDArray[np.intp]
-    line: NDArray[np.intp]
-    side: Floats
-    share: Floats
+    distance: Floats  # signed, from its edge, inside negative (n,) [m]; from a dash's end along the painted centre line
+    slope: Floats  # unit vector in which the distance grows (n, 2)
+    stretch: NDArray[np.intp]  # which of the road's segments it is on (n,)
+    line: NDArray[np.intp]  # which of LINES it is (n,); the ends of dashes are the last
+    side: Floats  # 1 where the nearest edge goes away as the marking moves right, or on, −1 where it comes (n,)
+    share: Floats  # how much of the stretch lies behind, from 0 to 1 (n,)
 
 
 class Markings:
@@ -150,9 +99,27 @@ class Markings:
         stretches = painted(road)
         self.road = road
         self.stretches = len(stretches)
-        self._layout: RoadLayout = lay_out(road.begin, tuple(part for stretch in stretches for part in stretch))
-        self._sizes, self._ends, self._dashes = _lengths_and_dashes(road, stretches)
+        self._layout = lay_out(road.begin, tuple(part for stretch in stretches for part in stretch))
+        self._sizes = np.array([length(stretch) for stretch in stretches])
+        self._ends, pairs = np.cumsum(self._sizes), zip(road.segments, self._sizes, strict=True)
+        self._dashes = np.array([dashes_on(road.paint, segment, float(size)) for segment, size in pairs])
+        # The dashes share a stretch's length evenly, a gap at either end
         self._gap = self._sizes / (self._dashes * (DASH_PER_GAP + 1.0) + 1.0)
+
+    def shapes(self, places: Floats) -> dict[str, Floats]:
+        """Signed distances (…) of places (…, 2) from what is painted by colours [m], the lowest layer first."""
+        paint, half = self.road.paint, np.array(self.road.size) / 2.0
+        near, along, stretch = self._find(places)
+        aside, gap = np.abs(near.outside), self._gap[stretch]
+        within, first = along - (self._ends - self._sizes)[stretch], gap + gap * DASH_PER_GAP / 2.0
+        period = gap * (DASH_PER_GAP + 1.0)
+        nearest = np.clip(np.rint((within - first) / period), 0, self._dashes[stretch] - 1)
+        from_dash = np.abs(within - first - nearest * period) - gap * DASH_PER_GAP / 2.0
+        return {
+            "asphalt": (np.abs(places - half) - half).max(axis=-1),
+            "white": np.abs(aside - (self.road.width - paint.white_width) / 2.0) - paint.white_width / 2.0,
+            "yellow": np.maximum(aside - paint.yellow_width / 2.0, from_dash),
+        }
 
     def white(self, places: Floats) -> Marks:
         """The nearest white line to places (n, 2) [m]."""
@@ -179,11 +146,15 @@ class Markings:
         distance = np.where(end, np.abs(off) - half, aside)
         return Marks(distance, slope, stretch, np.where(end, 3, 2), -beyond, share)
 
+    def _find(self, places: Floats) -> tuple[NearestPoints, Floats, NDArray[np.intp]]:
+        """The nearest points of the centre line, how far round they are, and on which stretch."""
+        near = find_nearest(self._layout, places)
+        along = way_round(self._layout, near.section, near.straight, near.turned, np.zeros(()))
+        return near, along, np.clip(np.searchsorted(self._ends, along, side="right"), 0, self.stretches - 1)
+
     def _along(self, places: Floats) -> tuple[Floats, Floats, Floats, NDArray[np.intp], Floats]:
         """Distance right of the centre line, the unit vector to the right, how far round, stretch and share of it."""
-        near = find_nearest(self._layout, places)
+        near, along, stretch = self._find(places)
         side = self._layout.side[near.section]
-        along = way_round(self._layout, near.section, near.straight, near.turned, np.zeros(()))
-        stretch = np.clip(np.searchsorted(self._ends, along, side="right"), 0, self.stretches - 1)
         share = (along - (self._ends - self._sizes)[stretch]) / self._sizes[stretch]
         return side * near.outside, side[:, None] * unit(near.normal), along, stretch, np.clip(share, 0.0, 1.0)

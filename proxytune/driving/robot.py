@@ -65,32 +65,21 @@ CAMERA = (
 """What an agent's view needs."""
 EXPERT = ("expert_look_ahead", "expert_speed", "expert_gain", "expert_disturbance")
 """What the expert that teaches to drive it needs."""
-WHEELS = ("wheel_distance",)
-"""What an examination needs, which looks where each wheel is."""
 WITHOUT_BODY = 'use plant = "planar"'
 
 
 @dataclass(frozen=True)
 class Robot:
-    """A robot's nominal figures and effects.
+    """A robot's nominal figures and effects."""
 
-    Attributes:
-        name: Name of its folder.
-        description: What it is, in one line.
-        figures: Those nominal figures that are known, by name, in the units of UNITS; those REQUIRED are among them.
-        theta: Values of the effects that every instance of it has.
-        urdf: Its body for the bullet plant, or None.
-        catalogue: The effects that it may have, and how it drives.
-        reverse: Whether it drives backwards too.
-    """
-
-    name: str
-    description: str
+    name: str  # name of its folder
+    description: str  # what it is, in one line
+    # those nominal figures that are known, by name, in the units of UNITS; those REQUIRED are among them
     figures: Mapping[str, float]
-    theta: Mapping[str, float]
-    urdf: Path | None
-    catalogue: Catalogue = SHIPPED
-    reverse: bool = True
+    theta: Mapping[str, float]  # values of the effects that every instance of it has
+    urdf: Path | None  # its body for the bullet plant, or None
+    catalogue: Catalogue = SHIPPED  # the effects that it may have, and how it drives
+    reverse: bool = True  # whether it drives backwards too
 
     @property
     def drive(self) -> str:
@@ -110,22 +99,14 @@ class Robot:
         return self.figures["wheelbase"] / math.tan(math.radians(self.figures["wheel_angle"]))
 
     def body(self) -> Path:
-        """The URDF for the bullet plant.
-
-        Raises:
-            SettingsError: If the robot has no body.
-        """
+        """The URDF for the bullet plant; refused if the robot has none."""
         if self.urdf is None:
             raise SettingsError(f"robot '{self.name}' has no body: its robot.toml names no urdf; {WITHOUT_BODY}")
         self._need(BODY, "body", WITHOUT_BODY)
         return self.urdf
 
     def camera_figures(self) -> CameraFigures:
-        """The nominal camera: level, straight ahead, without distortion.
-
-        Raises:
-            SettingsError: If the robot has no camera.
-        """
+        """The nominal camera: level, straight ahead, without distortion; refused if the robot has none."""
         self._need(CAMERA, "camera", "choose a robot that has one")
         figures = self.figures
         return CameraFigures(
@@ -141,30 +122,21 @@ class Robot:
         )
 
     def expert_figures(self) -> tuple[float, float, float, float]:
-        """Look-ahead [m], speed [m/s], gain and disturbance [duty] of the expert that teaches to drive this robot.
-
-        Raises:
-            SettingsError: If the robot has none.
-        """
+        """Look-ahead [m], speed [m/s], gain and disturbance [duty] of the robot's expert; refused if it has none."""
         self._need(EXPERT, "expert", "add them, or teach with a robot that has one")
         look_ahead, speed, gain, disturbance = (self.figures[name] for name in EXPERT)
         return look_ahead, speed, gain, disturbance
 
     def wheel_distance(self) -> float:
-        """Distance between the wheels [m], by which a driving examination is scored.
-
-        Raises:
-            SettingsError: If the robot does not state it.
-        """
-        self._need(WHEELS, "stated wheel distance", "add it")
+        """Distance between the wheels [m], by which a driving examination is scored; refused if it is not stated."""
+        self._need(("wheel_distance",), "stated wheel distance", "add it")
         return self.figures["wheel_distance"]
 
     def _need(self, names: tuple[str, ...], part: str, otherwise: str) -> None:
         missing = [name for name in names if name not in self.figures]
         if missing:
-            raise SettingsError(
-                f"robot '{self.name}' has no {part}: its robot.toml states no {', '.join(missing)}; {otherwise}"
-            )
+            lacks = f"its robot.toml states no {', '.join(missing)}"
+            raise SettingsError(f"robot '{self.name}' has no {part}: {lacks}; {otherwise}")
 
 
 def robot_names(folder: Path | None = None) -> tuple[str, ...]:
@@ -175,10 +147,6 @@ def robot_names(folder: Path | None = None) -> tuple[str, ...]:
 
 def robot_home(name: str, folder: Path | None = None) -> Path:
     """The folder of a robot: in the study's folder first, then beside it, then shipped, then what a plug-in names.
-
-    Args:
-        name: The folder's name, or that of a plug-in.
-        folder: The user's folder, that of a study.
 
     Raises:
         SettingsError: If there is no such robot.
@@ -198,11 +166,7 @@ def robot_home(name: str, folder: Path | None = None) -> Path:
 
 @functools.lru_cache
 def read_robot(name: str, folder: Path | None = None) -> Robot:
-    """Read a robot by name.
-
-    Args:
-        name: Of its folder.
-        folder: A user's folder, where robots and modules of effects come before those shipped.
+    """Read a robot by its folder's name; robots and modules of effects in a user's folder come before shipped ones.
 
     Raises:
         SettingsError: If there is no such robot or its robot.toml is not complete.
@@ -224,10 +188,7 @@ def read_robot(name: str, folder: Path | None = None) -> Robot:
 def catalogue_of(robot: str, folder: Path | None, own: tuple[str, ...] = ()) -> Catalogue:
     """The effects that a robot of this name may have, or one on two wheels where none is known by it.
 
-    Args:
-        robot: Its name.
-        folder: A user's folder, where robots and modules of effects come before those shipped.
-        own: Effects that a diagnosis is to try beside.
+    A user's folder comes before what is shipped; `own` are effects that a diagnosis is to try beside.
     """
     known = robot in robot_names(folder)
     return replace(read_robot(robot, folder).catalogue if known else Catalogue(folder), folder=folder, own=own)
@@ -246,20 +207,15 @@ def read_model_of(path: Path, folder: Path | None) -> Model:
 def robot_from_geometry(name: str, geometry: Mapping[str, float], control_rate: float) -> Robot:
     """A robot without a folder, as its log describes it: it obeys at once and has no effects.
 
-    Args:
-        name: What the log calls it.
-        geometry: Its wheel_radius and effective_baseline [m] and full_speed [m/s].
-        control_rate: How often it is sent a command [Hz].
+    Its geometry is wheel_radius and effective_baseline [m] and full_speed [m/s], the rate that of its commands [Hz].
 
     Raises:
         SettingsError: If the log leaves one of them out.
     """
     missing = [figure for figure in ("wheel_radius", "effective_baseline", "full_speed") if figure not in geometry]
     if missing:
-        raise SettingsError(
-            f"robot '{name}' is unknown and its log states no {', '.join(missing)}; "
-            "add wheel_radius_m, baseline_m and full_speed_m_s to log.toml"
-        )
+        remedy = "add wheel_radius_m, baseline_m and full_speed_m_s to log.toml"
+        raise SettingsError(f"robot '{name}' is unknown and its log states no {', '.join(missing)}; {remedy}")
     figures = {**geometry, "motor_time_constant": 0.0, "control_rate": control_rate}
     return Robot(name, "as its log describes it", MappingProxyType(figures), MappingProxyType({}), None)
 

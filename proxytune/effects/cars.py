@@ -137,19 +137,12 @@ FAR = 1e9
 
 
 class RollingState(NamedTuple):
-    """A car that rolls.
+    """A car that rolls."""
 
-    Attributes:
-        speed: At the end of the last sample (…,), as a fraction of full speed.
-        ahead: Whether its motor last drove it forwards (…,): 1, or −1.
-        sample_s: How long a sample lasts [s].
-        friction: What friction takes from it in a second.
-    """
-
-    speed: Signal
-    ahead: Signal
-    sample_s: float
-    friction: float
+    speed: Signal  # at the end of the last sample (…,), as a fraction of full speed
+    ahead: Signal  # whether its motor last drove it forwards (…,): 1, or −1
+    sample_s: float  # how long a sample lasts [s]
+    friction: float  # what friction takes from it in a second
 
 
 @effect("rolling", Stage.ACTUATION)
@@ -279,14 +272,10 @@ UNEVEN = "imbalance"
 def on_column(
     wheels: type[Any], column: int, name: str, does: str = "", changed: Mapping[str, Any] | None = None
 ) -> type[Effect]:
-    """An effect on wheels as one on a column.
+    """An effect on wheels as one on a column, under a name of its own.
 
-    Args:
-        wheels: Class of the effect on wheels.
-        column: THROTTLE or STEERING.
-        name: What it is called.
-        does: What it does, where the wheels' own docstring does not say it.
-        changed: What is different about its parameters: bounds, probes, source.
+    `does` says what it does where the wheels' own docstring does not, `changed` what is different about its parameters:
+    bounds, probes, source.
     """
     own = tuple(replace(one, **(changed or {})) for one in wheels.parameters if one.name != UNEVEN)
     even = {UNEVEN: 0.0} if len(own) < len(wheels.parameters) else {}
@@ -305,9 +294,8 @@ def on_column(
     begin.__doc__, apply.__doc__ = "Begin as two wheels that are alike.", "Filter the column, and leave the other."
     body = {"name": name, "stage": wheels.stage, "parameters": own, "trace": _trace(wheels.trace, column)}
     title = "".join(part.title() for part in name.split("_")) + ("OfCar" if column == THROTTLE else "")
-    kind = make_dataclass(
-        title, [(one.name, float) for one in own], namespace={**body, "begin": begin, "apply": apply}, frozen=True
-    )
+    fields = [(one.name, float) for one in own]
+    kind = make_dataclass(title, fields, namespace={**body, "begin": begin, "apply": apply}, frozen=True)
     kind.__doc__, kind.__module__ = does or wheels.__doc__, __name__
     return cast(type[Effect], kind)
 

@@ -41,11 +41,7 @@ TICKS, RATE_HZ = 8, 20.0
 
 @lru_cache
 def outside_effect(name: str, folder: Path | None) -> type[Effect]:
-    """The class of an effect that is not shipped: `module:Attribute`, or the name of a plug-in.
-
-    Raises:
-        ExtensionError: If there is none, or it is not what an effect must be.
-    """
+    """The class of an effect that is not shipped: `module:Attribute`, or a plug-in's name; refused if it is none."""
     kind = load(name, kind="effect", beside=folder, needs=MEMBERS)
     for problem in problems(kind):
         raise ExtensionError(f"effect '{name}' {problem}")
@@ -201,12 +197,7 @@ DECLARED_OF_CARS: tuple[str, ...] = ("steering_offset", "delay", "blur", "camera
 
 
 def theta_names(effect: type[Effect], name: str = "") -> tuple[str, ...]:
-    """The names of an effect's parameters in θ: its own where it has one, `effect.parameter` where it has more.
-
-    Args:
-        effect: Its class.
-        name: What it is called in θ, if that is not its own name.
-    """
+    """The names in θ of an effect's parameters: its own or another name, with `.parameter` where there are several."""
     called = name or effect.name
     if len(effect.parameters) == 1:
         return (called,)
@@ -242,16 +233,11 @@ class Catalogue:
 
     A user's own is called `module:Attribute`, and its parameters in θ `module:Attribute` where it has one, else
     `module:Attribute.parameter`. Whatever is not shipped comes after the shipped effects of its stage, by name.
-
-    Attributes:
-        folder: Whose modules come before the installed ones; None for the installed ones alone.
-        own: Effects that a diagnosis is to try beside the shipped ones and plug-ins.
-        drive: How the robot drives, one of DRIVES: which effects are shipped for it.
     """
 
-    folder: Path | None = None
-    own: tuple[str, ...] = ()
-    drive: str = "differential"
+    folder: Path | None = None  # whose modules come before the installed ones; None for the installed ones alone
+    own: tuple[str, ...] = ()  # effects that a diagnosis is to try beside the shipped ones and plug-ins
+    drive: str = "differential"  # how the robot drives, one of DRIVES: which effects are shipped for it
 
     @property
     def shipped(self) -> Mapping[str, type[Effect]]:
@@ -263,17 +249,9 @@ class Catalogue:
         """The effects that a domain family of it has before anything is found to be missing."""
         return DECLARED if self.drive == "differential" else DECLARED_OF_CARS
 
-    def hint(self, name: str) -> str:
-        """A hint that ends an error line on an effect or a parameter that it does not have."""
-        return parameter_hint(name, self.parameters)
-
     @property
     def names(self) -> tuple[str, ...]:
-        """The effects to choose from: those shipped in the order in which the signal meets them, plug-ins, `own`.
-
-        Raises:
-            ExtensionError: If two plug-ins have one name, or one has that of a shipped effect.
-        """
+        """The effects to choose from: those shipped in the order in which the signal meets them, plug-ins, `own`."""
         known = {name for effects in DRIVES.values() for name in effects}
         return tuple(dict.fromkeys((*self.shipped, *plugins("effect", known), *self.own)))
 
@@ -283,11 +261,7 @@ class Catalogue:
         return Parameters(self)
 
     def effect(self, name: str) -> type[Effect]:
-        """The effect of this name.
-
-        Raises:
-            ExtensionError: If there is none, or it is not what an effect must be.
-        """
+        """The effect of this name; refused if there is none, or it is not what an effect must be."""
         return self.shipped[name] if name in self.shipped else outside_effect(name, self.folder)
 
     def theta_names(self, name: str) -> tuple[str, ...]:
@@ -301,11 +275,7 @@ class Catalogue:
 
 @dataclass(frozen=True)
 class Parameters(Mapping[str, Parameter]):
-    """The parameters of a catalogue by their names in θ; a user's own effects answer where they are asked for by name.
-
-    Raises:
-        ExtensionError: If an effect that is asked for cannot be used.
-    """
+    """The parameters of a catalogue by their names in θ; a user's own effects answer where asked for by name."""
 
     catalogue: Catalogue
 
@@ -378,9 +348,8 @@ def _value(name: str, parameter: Parameter, theta: Theta, nominal: Mapping[str, 
 def _check(name: str, value: float, catalogue: Catalogue) -> None:
     parameters = catalogue.parameters
     if name not in parameters:
-        raise SettingsError(f"{name}: no effect has this parameter; {catalogue.hint(name)}")
+        raise SettingsError(f"{name}: no effect has this parameter; {parameter_hint(name, parameters)}")
     parameter = parameters[name]
     if not parameter.low <= value <= parameter.high:
-        raise SettingsError(
-            f"{name}: must be between {parameter.low:g} and {parameter.high:g} {parameter.unit}, got {value}"
-        )
+        bounds = f"{parameter.low:g} and {parameter.high:g} {parameter.unit}"
+        raise SettingsError(f"{name}: must be between {bounds}, got {value}")

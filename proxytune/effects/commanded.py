@@ -35,38 +35,22 @@ LONG_S = 1e6
 
 
 class Commands(NamedTuple):
-    """Duties and their past, wheel by wheel (…, time, 2) where nothing else is said.
+    """Duties and their past, wheel by wheel (…, time, 2) where nothing else is said."""
 
-    Attributes:
-        duty: The duties that reach the motors.
-        held: Since either of them last changed [s].
-        begun: Since each last was still, for more than a sample [s].
-        turned: Since each last took the other sign [s].
-        dragged: Each through plays of some widths (…, time, 2, widths).
-        slow: Low-passes of each (…, time, 2, time constants).
-        ramped: Each where its size grows and shrinks no faster than in such times (…, time, 2, pairs of times).
-    """
-
-    duty: Signal
-    held: Signal
-    begun: Signal
-    turned: Signal
-    dragged: Signal
-    slow: Signal
-    ramped: Signal
+    duty: Signal  # the duties that reach the motors
+    held: Signal  # since either of them last changed [s]
+    begun: Signal  # since each last was still, for more than a sample [s]
+    turned: Signal  # since each last took the other sign [s]
+    dragged: Signal  # each through plays of some widths (…, time, 2, widths)
+    slow: Signal  # low-passes of each (…, time, 2, time constants)
+    ramped: Signal  # each where its size grows and shrinks no faster than in such times (…, time, 2, pairs of times)
 
 
 class CommandState(NamedTuple):
     """The past of the next chunk: `Commands` without the time axis, and the sign of each wheel's last motion."""
 
-    duty: Signal
+    last: Commands
     sign: Signal
-    held: Signal
-    begun: Signal
-    turned: Signal
-    dragged: Signal
-    slow: Signal
-    ramped: Signal
     rate_hz: float
 
 
@@ -140,10 +124,9 @@ class LearntCommands:
         """The resting command has been given for ever."""
         rest = np.asarray(context.rest, dtype=float)
         long, begun = np.full(rest.shape, LONG_S), np.where(np.abs(rest) < STILL, 0.0, LONG_S)
-        dragged, slow, ramped = (
-            np.repeat(rest[..., None], len(self._knots(name)), axis=-1) for name in ("dragged", "ended", "ramped")
-        )
-        return CommandState(rest, np.sign(rest), long, begun, long, dragged, slow, ramped, context.rate_hz)
+        knots = map(self._knots, ("dragged", "ended", "ramped"))
+        dragged, slow, ramped = (np.repeat(rest[..., None], len(own), axis=-1) for own in knots)
+        return CommandState(Commands(rest, long, begun, long, dragged, slow, ramped), np.sign(rest), context.rate_hz)
 
     def apply(self, signal: Signal, memory: CommandState) -> tuple[Signal, CommandState]:
         """Add what the curves say."""
@@ -169,38 +152,28 @@ class LearntCommands:
             newest = np.maximum.accumulate(np.where(event, number, -before[..., None, :] * past.rate_hz), axis=-2)
             return np.asarray((number - newest) / past.rate_hz)
 
-        before = np.concatenate((past.duty[..., None, :], signal), axis=-2)
+        last, before = past.last, np.concatenate((past.last.duty[..., None, :], signal), axis=-2)
         changed = (np.abs(np.diff(before, axis=-2)) > SAME).any(axis=-1, keepdims=True)
         # A delay that is no whole number of samples mixes two commands: one of each sign make no stop.
         still = np.abs(before) < STILL
         wheels = np.moveaxis(signal, -2, -1)
         course = newest_signs(np.concatenate((past.sign[..., None], np.sign(wheels)), axis=-1))
         turned = np.moveaxis(np.diff(course, axis=-1) * course[..., :-1] != 0.0, -1, -2)
-        dragged = np.moveaxis(play(wheels, past.dragged, self._knots("dragged")), -2, -3)
-        slow = np.moveaxis(low_passes(wheels, past.slow, self._knots("ended"), past.rate_hz), -2, -3)
+        dragged = np.moveaxis(play(wheels, last.dragged, self._knots("dragged")), -2, -3)
+        slow = np.moveaxis(low_passes(wheels, last.slow, self._knots("ended"), past.rate_hz), -2, -3)
         fewest = np.maximum(np.reshape(self._knots("ramped"), (-1, 2)) * past.rate_hz, 1.0 / LONG_S)
-        ramped = np.moveaxis(ramp(wheels, past.ramped, *(1.0 / fewest.T)), -2, -3)
+        ramped = np.moveaxis(ramp(wheels, last.ramped, *(1.0 / fewest.T)), -2, -3)
         commands = Commands(
             duty=signal,
-            held=since(np.broadcast_to(changed, signal.shape), past.held),
-            begun=since(still[..., 1:, :] & still[..., :-1, :], past.begun),
-            turned=since(turned, past.turned),
+            held=since(np.broadcast_to(changed, signal.shape), last.held),
+            begun=since(still[..., 1:, :] & still[..., :-1, :], last.begun),
+            turned=since(turned, last.turned),
             dragged=dragged,
             slow=slow,
             ramped=ramped,
         )
-        after = CommandState(
-            duty=signal[..., -1, :],
-            sign=course[..., -1],
-            held=commands.held[..., -1, :],
-            begun=commands.begun[..., -1, :],
-            turned=commands.turned[..., -1, :],
-            dragged=dragged[..., -1, :, :],
-            slow=slow[..., -1, :, :],
-            ramped=ramped[..., -1, :, :],
-            rate_hz=past.rate_hz,
-        )
-        return commands, after
+        newest = Commands._make(part.take(-1, axis=signal.ndim - 2) for part in commands)
+        return commands, CommandState(newest, course[..., -1], past.rate_hz)
 
 
 def _basis(curve: LearntCurve) -> Callable[[Commands, Knots], Signal]:

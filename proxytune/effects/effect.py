@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from enum import StrEnum
 from types import ModuleType
-from typing import Any, ClassVar, NamedTuple, Protocol, TypeVar, dataclass_transform, runtime_checkable
+from typing import Any, ClassVar, NamedTuple, Protocol, TypeVar, dataclass_transform
 
 import numpy as np
 from numpy.typing import NDArray
@@ -80,30 +80,20 @@ class WheelCurve(StrEnum):
 
 
 class Lateness(NamedTuple):
-    """Lateness of commands under a random effect: its mean [s], and a mixture of times about it.
+    """Lateness of commands under a random effect: its mean [s], and a mixture of times about it."""
 
-    Attributes:
-        mean_s: How late a command is on average [s].
-        commands: Times that a command may be later than that (K,), in commands.
-        log_weights: Logarithms of how often each happens (K,).
-    """
-
-    mean_s: float
-    commands: NDArray[Any]
-    log_weights: NDArray[Any]
+    mean_s: float  # how late a command is on average [s]
+    commands: NDArray[Any]  # times that a command may be later than that (K,), in commands
+    log_weights: NDArray[Any]  # logarithms of how often each happens (K,)
 
 
 @dataclass(frozen=True)
 class Draws:
-    """Random draws of an effect of one parameter, one for each command.
+    """Random draws of an effect of one parameter, one for each command."""
 
-    Attributes:
-        lateness: From the parameter's value and the commands per second to how late commands are.
-        sizes: Least and greatest value that is looked for.
-    """
-
+    # from the parameter's value and the commands per second to how late commands are
     lateness: Callable[[float, float], Lateness]
-    sizes: tuple[float, float]
+    sizes: tuple[float, float]  # least and greatest value that is looked for
 
 
 @dataclass(frozen=True)
@@ -228,11 +218,9 @@ class Effect(Protocol):
 
     def begin(self, context: FilterContext) -> Memory:
         """The memory before the first sample."""
-        ...
 
     def apply(self, signal: Signal, memory: Memory) -> tuple[Signal, Memory]:
         """Filter the next chunk, shape (…, time, channels), and give the memory for the one after."""
-        ...
 
 
 class ShippedEffect(Effect):
@@ -288,27 +276,9 @@ def effect(name: str, stage: Stage) -> Callable[[type[Kind]], type[Kind]]:
     return make
 
 
-@runtime_checkable
-class Separate(Protocol):
-    """An effect that does each sample by itself, so that those nobody looks at may be left out."""
-
-    def skip(self, memory: Memory, samples: int, /) -> Memory:
-        """The memory after so many more samples."""
-        ...
-
-
 def skip_nothing(effect: object, memory: Any, samples: int) -> Any:
-    """The `skip` of an effect that does the same to each sample."""
+    """The `skip` of an effect that does the same to each sample: its memory after so many more."""
     return memory
-
-
-@runtime_checkable
-class Recalling(Protocol):
-    """An effect for which it matters what came before a window that begins amid a drive."""
-
-    def recall(self, context: FilterContext, signal: Signal, row: Signal, sample: Signal) -> Memory:
-        """The memory as of a sample (W,) of a row (W,) of longer signals (rows, time, channels)."""
-        ...
 
 
 FEW = 8
@@ -332,17 +302,11 @@ def _by_numba() -> ModuleType | None:
 
 
 class LowPassState(NamedTuple):
-    """A first-order low-pass under way.
+    """A first-order low-pass under way."""
 
-    Attributes:
-        value: What follows the signal, at the end of the last sample (…, channels).
-        remainder: How much of a step is left after one sample.
-        mean_remainder: How much of it is left on average over that sample.
-    """
-
-    value: Signal
-    remainder: float
-    mean_remainder: float
+    value: Signal  # what follows the signal, at the end of the last sample (…, channels)
+    remainder: float  # how much of a step is left after one sample
+    mean_remainder: float  # how much of it is left on average over that sample
 
 
 def low_pass_at(value: Signal, samples: float) -> LowPassState:
@@ -359,10 +323,9 @@ def lfilter(*words: Any, **named: Any) -> Any:
 
 
 def low_pass(signal: Signal, state: LowPassState) -> tuple[Signal, LowPassState]:
-    """Follow a signal (…, time, channels) with a first-order lag, exactly for one that holds over each sample.
+    """The mean over each sample of what follows a signal (…, time, channels), and the state after the last one.
 
-    Returns:
-        The mean over each sample of what follows (…, time, channels), and the state after the last one.
+    It follows with a first-order lag, exactly for a signal that holds over each sample.
     """
     value, remainder, mean_remainder = state
     start, gain = value[..., None, :], 1.0 - remainder

@@ -19,37 +19,21 @@ Knots = tuple[Knot, ...]
 
 
 class AskedMotion(NamedTuple):
-    """The motion asked for, held within what was seen, and its past, (…, time) where nothing else is said.
+    """The motion asked for, held within what was seen, and its past, (…, time) where nothing else is said."""
 
-    Attributes:
-        forward: Forward speed [m/s].
-        yaw: Yaw rate [rad/s].
-        wheels: Speeds of the left and the right wheel over the floor [m/s] (2, …, time).
-        seconds: Since the start [s].
-        use: Integral of the mean wheel speed's size, as a fraction of full speed, since the start [min].
-        heading: Heading [rad].
-        place: Place on the floor [m] (…, time, 2).
-        bands: Of each wheel's speed, the part between neighbouring low-passes [m/s] (2, …, time, time constants).
-        loads: Low-passes of the mean wheel speed's size, as a fraction of full speed (…, time, time constants).
-        rolled: How far each wheel, and the robot, has gone since it last turned the other way [m] (3, …, time).
-        started: Since each wheel last stood [s] (2, …, time).
-        rings: Damped swings, complex, that each change of a wheel's speed sets off [m/s] (2, …, time, frequencies).
-        played: Each wheel's speed through plays of some widths [m/s] (2, …, time, widths).
-    """
-
-    forward: Signal
-    yaw: Signal
-    wheels: Signal
-    seconds: Signal
-    use: Signal
-    heading: Signal
-    place: Signal
-    bands: Signal
-    loads: Signal
-    rolled: Signal
-    started: Signal
-    rings: Signal
-    played: Signal
+    forward: Signal  # forward speed [m/s]
+    yaw: Signal  # yaw rate [rad/s]
+    wheels: Signal  # speeds of the left and the right wheel over the floor [m/s] (2, …, time)
+    seconds: Signal  # since the start [s]
+    use: Signal  # integral of the mean wheel speed's size, as a fraction of full speed, since the start [min]
+    heading: Signal  # heading [rad]
+    place: Signal  # place on the floor [m] (…, time, 2)
+    bands: Signal  # of each wheel's speed, the part between neighbouring low-passes [m/s] (2, …, time, time constants)
+    loads: Signal  # low-passes of the mean wheel speed's size, as a fraction of full speed (…, time, time constants)
+    rolled: Signal  # how far each wheel, and the robot, has gone since it last turned the other way [m] (3, …, time)
+    started: Signal  # since each wheel last stood [s] (2, …, time)
+    rings: Signal  # damped complex swings that each change of a wheel's speed sets off [m/s] (2, …, time, frequencies)
+    played: Signal  # each wheel's speed through plays of some widths [m/s] (2, …, time, widths)
 
 
 WIDEST_MESH_M = 2.0
@@ -165,9 +149,18 @@ def body_after_reversal(asked: AskedMotion, knots: Knots) -> Signal:
     return np.asarray(asked.forward[..., None] * np.exp(-np.abs(asked.rolled[2])[..., None] / np.asarray(knots)))
 
 
-def waves(wave: Callable[[Signal], Signal]) -> Callable[[AskedMotion, Knots], Signal]:
-    """Harmonics of the heading while the robot moves."""
-    return lambda a, k: wave(a.heading[..., None] * np.asarray(k)) * moving(a)[..., None]
+Part = Callable[[AskedMotion], Signal]
+"""A signal of the motion that is asked for."""
+
+
+def waves(wave: Callable[[Signal], Signal], share_of: Part | None = None) -> Callable[[AskedMotion, Knots], Signal]:
+    """Harmonics of the heading while the robot moves, as shares of something or as they are."""
+
+    def basis(asked: AskedMotion, knots: Knots) -> Signal:
+        plain = wave(asked.heading[..., None] * np.asarray(knots)) * moving(asked)[..., None]
+        return plain * share_of(asked)[..., None] if share_of else plain
+
+    return basis
 
 
 class Channel(NamedTuple):
@@ -188,19 +181,12 @@ class LearntCurve(NamedTuple):
 
 
 class Group(NamedTuple):
-    """Curves over one signal.
+    """Curves over one signal."""
 
-    Attributes:
-        title: What people call the signal.
-        unit: The unit of the knots.
-        channels: What the curves add, by name.
-        low: The lowest knot that makes sense, or None where knots may be negative.
-    """
-
-    title: str
-    unit: str
-    channels: Mapping[str, Channel]
-    low: float | None = None
+    title: str  # what people call the signal
+    unit: str  # the unit of the knots
+    channels: Mapping[str, Channel]  # what the curves add, by name
+    low: float | None = None  # the lowest knot that makes sense, or None where knots may be negative
 
 
 def _of_wheels(unit: str, basis: Callable[[AskedMotion, Knots, int], Signal], ending: str = "") -> dict[str, Channel]:
@@ -209,6 +195,11 @@ def _of_wheels(unit: str, basis: Callable[[AskedMotion, Knots, int], Signal], en
         f"left{ending}": Channel("left", unit, lambda a, k: basis(a, k, 0)),
         f"right{ending}": Channel("right", unit, lambda a, k: basis(a, k, 1)),
     }
+
+
+def _of_heading(name: str, to: str, unit: str, share_of: Part | None = None) -> dict[str, Channel]:
+    """A channel of cosines and one of sines."""
+    return {f"{name}_{wave.__name__}": Channel(to, unit, waves(wave, share_of)) for wave in (np.cos, np.sin)}
 
 
 LEVEL = "level"
@@ -234,6 +225,10 @@ def _of_tracker(axis: int) -> Group:
     return Group(f"the tracker's {'xy'[axis]}", "m", channels)
 
 
+def _group(title: str, unit: str, low: float | None = None, **channels: Channel) -> Group:
+    return Group(title, unit, channels, low)
+
+
 HEADING, PLACE = "heading", "place"
 OF_PLACE = (PLACE, "x", "y", "tracker_x", "tracker_y")
 """The groups that look at where the robot points, and at where it is."""
@@ -244,85 +239,67 @@ MOTION_GROUPS: Mapping[str, Group] = MappingProxyType(
         "other_wheel": Group(
             "speed of the other wheel", "m/s", _of_wheels("m/s", lambda a, k, wheel: hats(a.wheels[1 - wheel], k))
         ),
-        "turn_rate": Group(
+        "turn_rate": _group(
             "turn rate",
             "rad/s",
-            {
-                "forward": Channel("forward", "of the speed", lambda a, k: hats(a.yaw, k, a.forward)),
-                "sideways": Channel("sideways", "of the speed", lambda a, k: hats(a.yaw, k, a.forward)),
-                "yaw": Channel("yaw", "rad/s", lambda a, k: hats(a.yaw, k)),
-            },
+            forward=Channel("forward", "of the speed", lambda a, k: hats(a.yaw, k, a.forward)),
+            sideways=Channel("sideways", "of the speed", lambda a, k: hats(a.yaw, k, a.forward)),
+            yaw=Channel("yaw", "rad/s", lambda a, k: hats(a.yaw, k)),
         ),
-        "speed_and_turn": Group(
+        "speed_and_turn": _group(
             "speed and turn rate together",
             "m/s, rad/s",
-            {
-                "forward": Channel("forward", "m/s", grid),
-                "sideways": Channel("sideways", "m/s", grid),
-                "yaw": Channel("yaw", "rad/s", grid),
-            },
+            forward=Channel("forward", "m/s", grid),
+            sideways=Channel("sideways", "m/s", grid),
+            yaw=Channel("yaw", "rad/s", grid),
         ),
-        "transients": Group(
+        "transients": _group(
             "changes of wheel speed",
             "s",
-            {
-                **_of_wheels("of the change", lambda a, k, wheel: a.bands[wheel]),
-                **_of_wheels("of the change", slowing, "_slowing"),
-                **_of_wheels("of the change", stopping, "_stopping"),
-                "sideways": Channel("sideways", "of the change", lambda a, k: a.bands.mean(axis=0)),
-                "veer": Channel("yaw", "rad/m", lambda a, k: a.bands.mean(axis=0)),
-            },
             1e-3,
+            **_of_wheels("of the change", lambda a, k, wheel: a.bands[wheel]),
+            **_of_wheels("of the change", slowing, "_slowing"),
+            **_of_wheels("of the change", stopping, "_stopping"),
+            sideways=Channel("sideways", "of the change", lambda a, k: a.bands.mean(axis=0)),
+            veer=Channel("yaw", "rad/m", lambda a, k: a.bands.mean(axis=0)),
         ),
-        "changes": Group(
+        "changes": _group(
             "changes of either wheel's speed, by speed and direction",
             "s",
-            {
-                **_of_wheels("s/m of the change", lambda a, k, wheel: a.bands[wheel] * fast(a, wheel), "_fast"),
-                **_of_wheels(
-                    "of the change", lambda a, k, wheel: a.bands[wheel] * (sign(a, wheel) < 0.0), "_backwards"
-                ),
-                **_of_wheels("of the change", lambda a, k, wheel: a.bands[1 - wheel], "_crossed"),
-            },
             1e-3,
+            **_of_wheels("s/m of the change", lambda a, k, wheel: a.bands[wheel] * fast(a, wheel), "_fast"),
+            **_of_wheels("of the change", lambda a, k, wheel: a.bands[wheel] * (sign(a, wheel) < 0.0), "_backwards"),
+            **_of_wheels("of the change", lambda a, k, wheel: a.bands[1 - wheel], "_crossed"),
         ),
-        "ringing": Group(
+        "ringing": _group(
             "swings after changes of wheel speed",
             "Hz",
-            {
-                **_of_wheels("of the change", lambda a, k, wheel: a.rings[wheel].real),
-                **_of_wheels("of the change", lambda a, k, wheel: a.rings[wheel].imag, "_later"),
-            },
             1e-3,
+            **_of_wheels("of the change", lambda a, k, wheel: a.rings[wheel].real),
+            **_of_wheels("of the change", lambda a, k, wheel: a.rings[wheel].imag, "_later"),
         ),
         "play": Group("way in which wheel speed changes", "m/s", _of_wheels("of the play", played), 1e-3),
-        "start": Group(
+        "start": _group(
             "time since it stood",
             "s",
-            {
-                **_of_wheels("of its speed", lambda a, k, wheel: a.wheels[wheel][..., None] * started(a, k, wheel)),
-                **_of_wheels("m/s", lambda a, k, wheel: sign(a, wheel) * started(a, k, wheel), "_push"),
-            },
             1e-3,
+            **_of_wheels("of its speed", lambda a, k, wheel: a.wheels[wheel][..., None] * started(a, k, wheel)),
+            **_of_wheels("m/s", lambda a, k, wheel: sign(a, wheel) * started(a, k, wheel), "_push"),
         ),
-        "reversal": Group(
+        "reversal": _group(
             "way since reversal",
             "m",
-            {
-                **_of_wheels("of its speed", after_reversal),
-                "forward": Channel("forward", "of the speed", body_after_reversal),
-                "veer": Channel("yaw", "rad/m", body_after_reversal),
-            },
             1e-3,
+            **_of_wheels("of its speed", after_reversal),
+            forward=Channel("forward", "of the speed", body_after_reversal),
+            veer=Channel("yaw", "rad/m", body_after_reversal),
         ),
-        "direction": Group(
+        "direction": _group(
             "direction of travel",
             "sign",
-            {
-                "forward": Channel("forward", "of the speed", lambda a, k: backwards(a, k) * a.forward[..., None]),
-                "yaw": Channel("yaw", "of the yaw rate", lambda a, k: backwards(a, k) * a.yaw[..., None]),
-                "veer": Channel("yaw", "rad/m", lambda a, k: backwards(a, k) * a.forward[..., None]),
-            },
+            forward=Channel("forward", "of the speed", lambda a, k: backwards(a, k) * a.forward[..., None]),
+            yaw=Channel("yaw", "of the yaw rate", lambda a, k: backwards(a, k) * a.yaw[..., None]),
+            veer=Channel("yaw", "rad/m", lambda a, k: backwards(a, k) * a.forward[..., None]),
         ),
         "time": Group(
             "time in the episode",
@@ -342,32 +319,16 @@ MOTION_GROUPS: Mapping[str, Group] = MappingProxyType(
             _of_wheels("of its speed", lambda a, k, wheel: a.loads * a.wheels[wheel][..., None]),
             1e-3,
         ),
-        HEADING: Group(
+        HEADING: _group(
             "heading",
             "turns a turn",
-            {
-                "forward_cos": Channel("forward", "m/s", waves(np.cos)),
-                "forward_sin": Channel("forward", "m/s", waves(np.sin)),
-                "sideways_cos": Channel("sideways", "m/s", waves(np.cos)),
-                "sideways_sin": Channel("sideways", "m/s", waves(np.sin)),
-                "veer_cos": Channel("yaw", "rad/m", lambda a, k: waves(np.cos)(a, k) * np.abs(a.forward)[..., None]),
-                "veer_sin": Channel("yaw", "rad/m", lambda a, k: waves(np.sin)(a, k) * np.abs(a.forward)[..., None]),
-                "ahead_cos": Channel(
-                    "forward", "of the speed", lambda a, k: waves(np.cos)(a, k) * a.forward[..., None]
-                ),
-                "ahead_sin": Channel(
-                    "forward", "of the speed", lambda a, k: waves(np.sin)(a, k) * a.forward[..., None]
-                ),
-                "aside_cos": Channel(
-                    "sideways", "of the speed", lambda a, k: waves(np.cos)(a, k) * a.forward[..., None]
-                ),
-                "aside_sin": Channel(
-                    "sideways", "of the speed", lambda a, k: waves(np.sin)(a, k) * a.forward[..., None]
-                ),
-                "yaw_cos": Channel("yaw", "of the yaw rate", lambda a, k: waves(np.cos)(a, k) * a.yaw[..., None]),
-                "yaw_sin": Channel("yaw", "of the yaw rate", lambda a, k: waves(np.sin)(a, k) * a.yaw[..., None]),
-            },
             1.0,
+            **_of_heading("forward", "forward", "m/s"),
+            **_of_heading("sideways", "sideways", "m/s"),
+            **_of_heading("veer", "yaw", "rad/m", lambda a: np.abs(a.forward)),
+            **_of_heading("ahead", "forward", "of the speed", lambda a: a.forward),
+            **_of_heading("aside", "sideways", "of the speed", lambda a: a.forward),
+            **_of_heading("yaw", "yaw", "of the yaw rate", lambda a: a.yaw),
         ),
         PLACE: _of_place("m, m", slice(None)),
         "x": _of_place("m", slice(0, 1)),
@@ -425,14 +386,7 @@ def ramp(signal: Signal, before: Signal, grows: Signal, shrinks: Signal) -> Sign
 
 
 def moved_since(speed: Signal, before: Signal, rest_speed: float, rate_hz: float) -> Signal:
-    """Time since a wheel last stood [s] (…, time), 0 while it does.
-
-    Args:
-        speed: Its speed (…, time).
-        before: How long ago that was before the first sample (…,).
-        rest_speed: It stands where it is slower than this, in the same unit.
-        rate_hz: Samples per second.
-    """
+    """Time since a wheel last stood, slower than a rest speed [s] (…, time); `before` the first sample so long (…,)."""
     number = np.arange(1.0, speed.shape[-1] + 1.0)
     stood = np.where(np.abs(speed) < rest_speed, number, -before[..., None] * rate_hz)
     return np.asarray((number - np.maximum.accumulate(stood, axis=-1)) / rate_hz)
@@ -451,10 +405,7 @@ LONG_M = 10.0
 def rolled_since(speed: Signal, before: Signal, rate_hz: float) -> Signal:
     """Way that a wheel has rolled since it last turned the other way [m] (…, time), negative backwards.
 
-    Args:
-        speed: Its speed [m/s] (…, time). Slower than REST_SPEED it turns no other way.
-        before: How far it had rolled so before the first sample (…,), 0 where it has not moved yet.
-        rate_hz: Samples per second.
+    Slower than REST_SPEED it turns no other way. `before` the first sample it had rolled so far (…,), 0 if not at all.
     """
     now = np.where(np.abs(speed) < REST_SPEED, 0.0, np.sign(speed))
     course = newest_signs(np.concatenate((np.sign(before)[..., None], now), axis=-1))

@@ -42,40 +42,22 @@ class FittedRange(NamedTuple):
 
 
 class LearntState(NamedTuple):
-    """State of all that has been so far: arrays of the batch's shape, and low-passes with their time constants last.
+    """State of all that has been so far: arrays of the batch's shape, and low-passes with their time constants last."""
 
-    Attributes:
-        seconds: Since the start [s].
-        use: Minutes at full speed.
-        slow: Low-passes of each wheel's speed (2, …, time constants).
-        load: Low-passes of the mean wheel speed's size (…, time constants).
-        rolled: How far each wheel, and the robot, has gone since it last turned the other way [m] (3, …), negative
-            backwards.
-        started: Since each wheel last stood [s] (2, …).
-        last: Each wheel's newest speed (2, …).
-        ring: Swings of each wheel's speed, complex (2, …, frequencies).
-        dragged: Each wheel's speed through plays (2, …, widths).
-        bearing: The heading, and headings that are known beforehand.
-        spot: The pose, and poses that are known beforehand.
-        rate_hz: Samples per second.
-        baseline: The robot's effective baseline [m].
-        full_speed: The robot's full speed [m/s].
-    """
-
-    seconds: Signal
-    use: Signal
-    slow: Signal
-    load: Signal
-    rolled: Signal
-    started: Signal
-    last: Signal
-    ring: Signal
-    dragged: Signal
-    bearing: DeadReckoning
-    spot: PoseReckoning
-    rate_hz: float
-    baseline: float
-    full_speed: float
+    seconds: Signal  # since the start [s]
+    use: Signal  # minutes at full speed
+    slow: Signal  # low-passes of each wheel's speed (2, …, time constants)
+    load: Signal  # low-passes of the mean wheel speed's size (…, time constants)
+    rolled: Signal  # way of each wheel and the robot since it last turned the other way [m] (3, …), negative backwards
+    started: Signal  # since each wheel last stood [s] (2, …)
+    last: Signal  # each wheel's newest speed (2, …)
+    ring: Signal  # swings of each wheel's speed, complex (2, …, frequencies)
+    dragged: Signal  # each wheel's speed through plays (2, …, widths)
+    bearing: DeadReckoning  # the heading, and headings that are known beforehand
+    spot: PoseReckoning  # the pose, and poses that are known beforehand
+    rate_hz: float  # samples per second
+    baseline: float  # the robot's effective baseline [m]
+    full_speed: float  # the robot's full speed [m/s]
 
 
 def track_of(nominal: Mapping[str, float]) -> float:
@@ -163,9 +145,8 @@ class Learnt:
             )
             out.append(moved[..., here, :] + self._added(now, memory.baseline, of_pose=True))
             _, bearing = reckon(out[-1][..., 2], bearing)
-            spot = spot._replace(
-                next=spot.next + step, pose=pose_after(poses[..., -1, :], out[-1][..., -1, :] / memory.rate_hz)
-            )
+            last = pose_after(poses[..., -1, :], out[-1][..., -1, :] / memory.rate_hz)
+            spot = spot._replace(next=spot.next + step, pose=last)
         return np.concatenate(out, axis=-2), bearing, spot
 
     @property
@@ -174,23 +155,15 @@ class Learnt:
         return self._constants("transients") or self._constants("changes")
 
     def recall(self, context: FilterContext, signal: Signal, row: Signal, sample: Signal) -> LearntState:
-        """The memory as of given samples of longer signals: the past of windows that begin amid drives.
-
-        Args:
-            context: Of the windows (W, …).
-            signal: What was asked for from the start on (rows, time, 3).
-            row: The row of each window (W,).
-            sample: The sample of its row at which each window begins (W,).
-        """
+        """The memory of windows (W, …) that begin at a sample (W,) of a row (W,) of longer signals (rows, time, 3)."""
         whole = self.begin(FilterContext(context.rate_hz, np.zeros((len(signal), 3)), context.nominal))
         asked, _ = self._asked(signal, whole)
 
         def before(values: Signal) -> Signal:
             return np.where((sample > 0).reshape(-1, *[1] * (values.ndim - 2)), values[row, sample - 1], 0.0)
 
-        slow = [
-            wheel[..., None] - np.cumsum(band, axis=-1) for wheel, band in zip(asked.wheels, asked.bands, strict=True)
-        ]
+        pairs = zip(asked.wheels, asked.bands, strict=True)
+        slow = [wheel[..., None] - np.cumsum(band, axis=-1) for wheel, band in pairs]
         return self.begin(context)._replace(
             seconds=sample / context.rate_hz,
             use=before(asked.use),
@@ -260,10 +233,9 @@ class Learnt:
         ringing = rings(change, past.ring, self._constants("ringing"), past.rate_hz)
         played = play(wheels, past.dragged, self._constants("play"))
         after = past._replace(seconds=seconds[..., -1], use=use[..., -1], slow=slow[..., -1, :], load=load[..., -1, :])
+        nowhere = (np.zeros_like(yaw), np.zeros((*yaw.shape, 2)))
         of_wheels = (bands, load, rolled, started, ringing, played)
-        asked = AskedMotion(
-            forward, yaw, wheels, seconds, use, np.zeros_like(yaw), np.zeros((*yaw.shape, 2)), *of_wheels
-        )
+        asked = AskedMotion(forward, yaw, wheels, seconds, use, *nowhere, *of_wheels)
         after = after._replace(rolled=rolled[..., -1], started=started[..., -1], last=wheels[..., -1])
         return asked, after._replace(ring=ringing[..., -1, :], dragged=played[..., -1, :])
 
@@ -330,11 +302,7 @@ def learnt_effect(theta: Theta) -> Learnt | None:
 
 
 def read_learnt(section: Section) -> dict[str, float]:
-    """The values of the `[effects.learnt]` tables by their names in θ.
-
-    Raises:
-        SettingsError: With file, key and remedy.
-    """
+    """The values of the `[effects.learnt]` tables by their names in θ."""
     section.only((RANGE, *GROUPS))
     if not section.values:
         return {}
@@ -384,9 +352,8 @@ def _checked(seen: FittedRange, curves: list[LearntCurve], problem: Callable[[st
     """The effect, if its values make one."""
     for channel, (low, high) in zip(FittedRange._fields, seen, strict=True):
         if not (math.isfinite(low) and math.isfinite(high) and low <= 0.0 <= high):
-            raise problem(
-                f"{RANGE}.{channel}", f"must be finite with 0 in it, got [{low:g}, {high:g}]; state what was seen"
-            )
+            told = f"must be finite with 0 in it, got [{low:g}, {high:g}]; state what was seen"
+            raise problem(f"{RANGE}.{channel}", told)
     for curve in curves:
         where, group = f"{curve.group}.{curve.channel}", GROUPS[curve.group]
         _check_knots(curve, f"{curve.group}.knots", group, problem)
@@ -425,10 +392,8 @@ def learnt_text(theta: Theta) -> str:
     if effect is None:
         return ""
     lines = [f"\n# {LABEL}", f"[effects.{Learnt.name}.{RANGE}]"]
-    lines += [
-        f"{channel} = [{low!r}, {high!r}]"
-        for channel, (low, high) in zip(FittedRange._fields, effect.seen, strict=True)
-    ]
+    ranges = zip(FittedRange._fields, effect.seen, strict=True)
+    lines += [f"{channel} = [{low!r}, {high!r}]" for channel, (low, high) in ranges]
     for group in dict.fromkeys(curve.group for curve in effect.curves):
         curves = [curve for curve in effect.curves if curve.group == group]
         lines += [

@@ -5,12 +5,12 @@ import zlib
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import cast
+from typing import Any
 
 import numpy as np
 
-from proxytune.effects.catalogue import DRIVES, SHIPPED, Catalogue, effect_of
-from proxytune.effects.effect import Effect, FilterContext, Memory, Recalling, Separate, Signal, Stage
+from proxytune.effects.catalogue import DRIVES, SHIPPED, Catalogue, effect_of, parameter_hint
+from proxytune.effects.effect import Effect, FilterContext, Memory, Signal, Stage
 from proxytune.effects.learnt import Learnt, is_learnt, learnt_text, read_learnt
 from proxytune.errors import ExtensionError
 from proxytune.settings import GEOMETRY, Section, nearest, read_settings
@@ -19,20 +19,13 @@ from proxytune.space import Parameter
 
 @dataclass(frozen=True)
 class Model:
-    """Content of a model.toml.
+    """Content of a model.toml."""
 
-    Attributes:
-        robot: Name of the robot.
-        plant: Name of the plant, or None where the reader chooses.
-        theta: Values of the effects' parameters by their names in θ.
-        intervals: The interval of each value that has one.
-        geometry: Figures of a robot without a folder: wheel_radius, effective_baseline [m], full_speed [m/s].
-    """
-
-    robot: str
-    plant: str | None
-    theta: Mapping[str, float]
-    intervals: Mapping[str, tuple[float, float]]
+    robot: str  # name of the robot
+    plant: str | None  # name of the plant, or None where the reader chooses
+    theta: Mapping[str, float]  # values of the effects' parameters by their names in θ
+    intervals: Mapping[str, tuple[float, float]]  # the interval of each value that has one
+    # figures of a robot without a folder: wheel_radius, effective_baseline [m], full_speed [m/s]
     geometry: Mapping[str, float] = field(default_factory=dict)
 
     @property
@@ -47,11 +40,7 @@ class Model:
 
 
 def read_model(path: Path, catalogue: Catalogue = SHIPPED) -> Model:
-    """Read a model.toml.
-
-    Args:
-        path: The file.
-        catalogue: The effects that it may name.
+    """Read a model.toml, which may name effects of a catalogue.
 
     Raises:
         SettingsError: With file, key and remedy.
@@ -115,8 +104,9 @@ def read_effects(
 def _parameters(section: Section, effect: str, catalogue: Catalogue) -> dict[str, Parameter]:
     """The parameters of an effect by their names in θ."""
     if not catalogue.knows(effect):
-        elsewhere = any(effect in effects for effects in DRIVES.values())
-        hint = catalogue.hint(effect) if elsewhere else nearest(effect, (*catalogue.names, Learnt.name))
+        hint = nearest(effect, (*catalogue.names, Learnt.name))
+        if any(effect in effects for effects in DRIVES.values()):
+            hint = parameter_hint(effect, catalogue.parameters)
         raise section.error(effect, f"no such effect; {hint} (your own is written module:Attribute)")
     try:
         return dict(zip(catalogue.theta_names(effect), catalogue.effect(effect).parameters, strict=True))
@@ -152,27 +142,22 @@ class Chain:
 
     def begin(self, context: FilterContext) -> tuple[Memory, ...]:
         """Every effect's memory, each with a seed of its own."""
-        return tuple(
-            effect.begin(replace(context, seed=zlib.crc32(effect.name.encode(), context.seed)))
-            for effect in self.effects
-        )
+        seeds = (zlib.crc32(effect.name.encode(), context.seed) for effect in self.effects)
+        return tuple(one.begin(replace(context, seed=seed)) for one, seed in zip(self.effects, seeds, strict=True))
 
     def begin_amid(
         self, context: FilterContext, whole: FilterContext, signal: Signal, row: Signal, sample: Signal
     ) -> Memory:
-        """The memories of windows that begin amid longer signals: what came before counts where an effect recalls it.
+        """The memories of windows (W, …) that begin at a sample (W,) of a row (W,) of longer signals.
 
-        Args:
-            context: Of the windows (W, …).
-            whole: Of the longer signals.
-            signal: Those signals from their start on (rows, time, channels).
-            row: The row of each window (W,).
-            sample: The sample of its row at which each window begins (W,).
+        What came before, in those signals (rows, time, channels) of the context `whole`, counts where an effect recalls
+        it.
         """
         memories = list(self.begin(context))
-        recalling = [number for number, effect in enumerate(self.effects) if isinstance(effect, Recalling)]
-        for number, effect in enumerate(self.effects[: max(recalling, default=-1) + 1]):
-            if isinstance(effect, Recalling):
+        recalling = [number for number, effect in enumerate(self.effects) if hasattr(effect, "recall")]
+        for number in range(max(recalling, default=-1) + 1):
+            effect: Any = self.effects[number]
+            if number in recalling:
                 memories[number] = effect.recall(context, signal, row, sample)
             signal, _ = effect.apply(signal, effect.begin(whole))
         return tuple(memories)
@@ -186,16 +171,16 @@ class Chain:
         return signal, tuple(after)
 
     def parted(self) -> tuple["Chain", "Chain"]:
-        """The effects that mix samples with those before, and the last ones, which do each sample by itself."""
+        """The effects that mix samples with those before, and the last ones, which can `skip` samples."""
         first = len(self.effects)
-        while first and isinstance(self.effects[first - 1], Separate):
+        while first and hasattr(self.effects[first - 1], "skip"):
             first -= 1
         return Chain(self.effects[:first]), Chain(self.effects[first:])
 
     def skip(self, memories: tuple[Memory, ...], samples: int) -> tuple[Memory, ...]:
         """The memories after samples that nobody looks at; all effects have to do each sample by itself."""
-        kept = zip(self.effects, memories, strict=True)
-        return tuple(cast(Separate, effect).skip(memory, samples) for effect, memory in kept)
+        kept: Any = zip(self.effects, memories, strict=True)
+        return tuple(effect.skip(memory, samples) for effect, memory in kept)
 
     def mean_weights(self, rate_hz: float) -> Signal | None:
         """The weights of the last samples, the newest last, if all that the effects make is a mean of these.

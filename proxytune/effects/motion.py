@@ -30,6 +30,12 @@ from proxytune.effects.effect import (
 )
 from proxytune.space import Parameter
 
+TURNING = (Cue.TURN_RATE, Cue.COMMAND_DIFFERENCE)
+
+
+def _by_turn_rate(*panels: Panel) -> Means:
+    return Means(Cue.TURN_RATE, panels)
+
 
 @effect("yaw_scrub", Stage.MOTION)
 class YawScrub(ShippedEffect):
@@ -39,7 +45,7 @@ class YawScrub(ShippedEffect):
         usual=(0.03, 3.0),
         source="wheel distance on hard tyres to a few times it with scrub: 0.16 m instead of 0.10 m on "
                "a Duckiebot")  # fmt: skip
-    trace = Trace((Cue.TURN_RATE, Cue.COMMAND_DIFFERENCE), Means(Cue.TURN_RATE, (Panel("turn", TURN, "turn"),)))
+    trace = Trace(TURNING, _by_turn_rate(Panel("turn", TURN, "turn")))
 
     def begin(self, context: FilterContext) -> float:
         """The factor on the yaw rate."""
@@ -56,9 +62,7 @@ class TurnSlip(ShippedEffect):
 
     loss: float = parameter("s/rad", 0.0, 15.0, probes=(0.02, 0.05, 0.1, 0.2, 0.4, 0.8), usual=(0.0, 1.5),
         source="tyres in a bend: some hundredths of the speed at 1 rad/s, tracks up to half")  # fmt: skip
-    trace = Trace(
-        (Cue.TURN_RATE, Cue.COMMAND_DIFFERENCE), Means(Cue.TURN_RATE, (Panel("turn", TURN, "forward", share=True),))
-    )
+    trace = Trace(TURNING, _by_turn_rate(Panel("turn", TURN, "forward", share=True)))
 
     def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
         """Slow the robot down in bends, at most to a stop."""
@@ -73,9 +77,7 @@ class LateralSlip(ShippedEffect):
     slip: float = parameter("s", -5.0, 5.0, probes=(-0.2, -0.08, -0.03, 0.03, 0.08, 0.2), usual=(-0.5, 0.5),
         source="slip angle of some degrees at 1 rad/s; a pose that is not measured at the axle looks "
                "the same")  # fmt: skip
-    trace = Trace(
-        (Cue.TURN_RATE,), Means(Cue.TURN_RATE, (Panel("bend", "forward speed times turn rate [m/s²]", "sideways"),))
-    )
+    trace = Trace((Cue.TURN_RATE,), _by_turn_rate(Panel("bend", "forward speed times turn rate [m/s²]", "sideways")))
 
     def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
         """Slide to the right in a bend to the left."""
@@ -97,7 +99,7 @@ class CrossCoupling(ShippedEffect):
         source="a dragging caster or a tyre that pulls: some degrees to tens of degrees a metre")  # fmt: skip
     trace = Trace(
         (Cue.TURN_RATE, Cue.DIRECTION, Cue.COMMAND_DIFFERENCE),
-        Means(Cue.TURN_RATE, (Panel("turn", TURN, "forward"), Panel("forward", "forward speed [m/s]", "turn"))),
+        _by_turn_rate(Panel("turn", TURN, "forward"), Panel("forward", "forward speed [m/s]", "turn")),
     )
 
     def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
@@ -113,10 +115,7 @@ class Understeer(ShippedEffect):
 
     gain: float = parameter("s/m", 0.0, 50.0, probes=(0.03, 0.1, 0.3, 0.8, 2.0), usual=(0.0, 5.0),
         source="tyres that slip sideways: some tenths of the turn at 1 m/s, small robots more")  # fmt: skip
-    trace = Trace(
-        (Cue.TURN_RATE, Cue.COMMAND_DIFFERENCE),
-        Means(Cue.TURN_RATE, (Panel("forward", "forward speed [m/s]", "turn", share=True),)),
-    )
+    trace = Trace(TURNING, _by_turn_rate(Panel("forward", "forward speed [m/s]", "turn", share=True)))
 
     def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
         """Scale the yaw rate."""
@@ -130,7 +129,7 @@ class YawLag(ShippedEffect):
 
     time_constant: float = parameter("s", 0.0, 10.0, probes=(0.02, 0.05, 0.1, 0.2, 0.4, 0.8), usual=(0.0, 1.0),
         source="a body that has to be turned on tyres that give: some hundredths to tenths of a second")  # fmt: skip
-    trace = Trace((Cue.TRANSIENTS, Cue.TURN_RATE), Means(Cue.TURN_RATE, (Panel("turn", TURN, "turn"),)))
+    trace = Trace((Cue.TRANSIENTS, Cue.TURN_RATE), _by_turn_rate(Panel("turn", TURN, "turn")))
 
     def begin(self, context: FilterContext) -> LowPassState:
         """The resting yaw rate has been reached."""
@@ -271,9 +270,7 @@ class MarkerOffset(ShippedEffect):
 
     forward: float = like(ASIDE)
     left: float = like(ASIDE)
-    trace = Trace(
-        (Cue.TURN_RATE,), Means(Cue.TURN_RATE, (Panel("turn", TURN, "forward"), Panel("turn", TURN, "sideways")))
-    )
+    trace = Trace((Cue.TURN_RATE,), _by_turn_rate(Panel("turn", TURN, "forward"), Panel("turn", TURN, "sideways")))
 
     def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
         """Move each pose to the tracked point."""
@@ -290,7 +287,7 @@ class HeadingOffset(ShippedEffect):
 
     angle: float = parameter("deg", -180.0, 180.0, probes=(-20.0, -8.0, -3.0, 3.0, 8.0, 20.0), usual=(-45.0, 45.0),
         source="a marker stuck on by hand: some degrees; more where its axes are another's")  # fmt: skip
-    trace = Trace((Cue.TURN_RATE,), Means(Cue.TURN_RATE, (Panel("forward", "forward speed [m/s]", "sideways"),)))
+    trace = Trace((Cue.TURN_RATE,), _by_turn_rate(Panel("forward", "forward speed [m/s]", "sideways")))
 
     def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
         """Add the angle to each heading."""

@@ -178,9 +178,8 @@ def _ramps(wanted: Signal, start: Signal, step: float) -> Signal:
     held = wanted.ravel()[begins]
     gaps = np.empty(len(begins))
     row, here = 0, 0.0
-    for number, (first, value, reach) in enumerate(
-        zip(begins.tolist(), held.tolist(), (lengths * step).tolist(), strict=True)
-    ):
+    ramps = zip(begins.tolist(), held.tolist(), (lengths * step).tolist(), strict=True)
+    for number, (first, value, reach) in enumerate(ramps):
         if first % wanted.shape[1] == 0:
             row, here = row + 1, float(start[row])
         gaps[number] = gap = here - value
@@ -189,6 +188,10 @@ def _ramps(wanted: Signal, start: Signal, step: float) -> Signal:
     way = (np.arange(wanted.size) - begins[of] + 1) * step
     ramp = np.sign(gaps[of]) * np.maximum(0.0, np.abs(gaps[of]) - way)
     return np.asarray((held[of] + ramp).reshape(wanted.shape))
+
+
+def _fading(cue: Cue, label: str) -> Means:
+    return Means(cue, (Panel("", label, "forward", share=True),))
 
 
 @effect("thermal_fade", Stage.ACTUATION)
@@ -202,9 +205,7 @@ class ThermalFade(ShippedEffect):
         source="windings that are 80 °C warmer have a third more resistance")  # fmt: skip
     time_constant: float = parameter("s", 0.5, 1200.0, 8.0, probes=(2.0, 4.0, 15.0, 40.0), usual=(0.5, 120.0),
         source="small motors warm up within seconds to minutes", shape=True)  # fmt: skip
-    trace = Trace(
-        (Cue.USE, Cue.TIME), Means(Cue.USE, (Panel("", "use so far [s at full duty]", "forward", share=True),))
-    )
+    trace = Trace((Cue.USE, Cue.TIME), _fading(Cue.USE, "use so far [s at full duty]"))
 
     def begin(self, context: FilterContext) -> LowPassState:
         """With motors as warm as the resting duty keeps them."""
@@ -237,10 +238,6 @@ class Saturation(ShippedEffect):
     def apply(self, signal: Signal, memory: Signal) -> tuple[Signal, Signal]:
         """Clip at ± limit."""
         return np.clip(signal, -memory, memory), memory
-
-
-def _fading(cue: Cue, label: str) -> Means:
-    return Means(cue, (Panel("", label, "forward", share=True),))
 
 
 class BatteryState(NamedTuple):

@@ -35,7 +35,6 @@ class Predictor(Protocol):
 
     def predict(self, observation: Any, *, deterministic: bool) -> Any:
         """The action for an observation, or the action and a state, which it is given back as `state=`."""
-        ...
 
 
 def ask_policy(policy: Predictor, observation: Any, state: Any, *, deterministic: bool = True) -> tuple[Any, Any]:
@@ -47,15 +46,10 @@ def ask_policy(policy: Predictor, observation: Any, state: Any, *, deterministic
 
 @dataclass(frozen=True)
 class PolicyAgent:
-    """Does what a policy says to each picture.
+    """Does what a policy says to each picture."""
 
-    Attributes:
-        policy: Trained on pictures as the environment shows them, (rows, columns, 3).
-        deterministic: Whether it takes its likeliest action; one that draws would make episodes differ at one seed.
-    """
-
-    policy: Predictor
-    deterministic: bool = True
+    policy: Predictor  # trained on pictures as the environment shows them, (rows, columns, 3)
+    deterministic: bool = True  # takes its likeliest action; one that draws makes episodes differ at one seed
 
     def begin(self, robot: Robot) -> None:
         """No state yet."""
@@ -114,17 +108,10 @@ class Predicting:
 
 
 def load_agent(name: Any, folder: Path, space: Any, seed: int) -> Act:
-    """An agent ready for one episode; a class is made anew for each.
+    """An agent ready for one episode, whose actions are of this space; refused where there is none.
 
-    Args:
-        name: "random", "zero", or `module:attribute`: a function, an object with `predict`, or a class of either; or
-            one of these itself.
-        folder: Where a user's modules lie.
-        space: The environment's actions.
-        seed: Of the agent "random".
-
-    Raises:
-        InputError: If there is no such agent, or the actions have no zero.
+    It is "random", which draws by the seed, "zero", or `module:attribute`: a function, an object with `predict`, or a
+    class of either, made anew for each episode; or one of these itself.
     """
     if isinstance(name, str) and name in BUILT_IN:
         if name == "zero" and (space.shape is None or space.dtype is None):
@@ -239,18 +226,12 @@ class GymnasiumFamily:
 
     A start is a state to begin from, the same in every instance and under every seed of a study; the episode's seed is
     for what the environment draws later, for effects, and for the agent "random".
-
-    Attributes:
-        settings: The [domain] table.
-        spaces: What the environment is.
-        held: Values that every instance has, sorted by name in θ.
-        policies: Agents that are at hand, by name; its identity says nothing of them.
     """
 
-    settings: EnvironmentSettings
-    spaces: Spaces
-    held: tuple[tuple[str, float], ...]
-    policies: Mapping[str, Any] = field(default_factory=dict)
+    settings: EnvironmentSettings  # the [domain] table
+    spaces: Spaces  # what the environment is
+    held: tuple[tuple[str, float], ...]  # values that every instance has, sorted by name in θ
+    policies: Mapping[str, Any] = field(default_factory=dict)  # agents at hand, by name; no part of the identity
 
     @property
     def identity(self) -> str:
@@ -379,14 +360,10 @@ class PlayedEnvironment:
 def played_environment(
     given: Any, space: Space, policies: Mapping[str, Any], domain: Mapping[str, Any], path: Path
 ) -> PlayedEnvironment:
-    """The function that plays an environment's episodes.
+    """The function that plays episodes of an environment, given as a registered name or as what makes it.
 
-    Args:
-        given: A registered name, or what makes the environment.
-        space: What is tuned: effects by name, attributes with a point, else arguments of the constructor.
-        policies: Agents by name.
-        domain: Other keys of a `[domain]` table.
-        path: The file that complaints name.
+    In its space are effects by name, attributes with a point, else arguments of the constructor; `domain` has other
+    keys of a `[domain]` table, and complaints name the path.
 
     Raises:
         InputError: If the environment, a parameter or a policy cannot be used.

@@ -30,15 +30,9 @@ ARROW_M = 0.09
 
 
 def render(picture: driving.Picture, road: driving.Road, poses: Signal) -> NDArray[np.uint8]:
-    """A picture beside the map.
+    """What the camera sees (rows, columns, 3) beside the map with the robot's way until now (ticks, 3).
 
-    Args:
-        picture: What the camera sees, (rows, columns, 3).
-        road: The map.
-        poses: The robot's way until now, (ticks, 3): x [m], y [m], heading [rad].
-
-    Returns:
-        Red, green, blue, (ROWS, columns, 3); the number of columns is even, as video encoders ask for.
+    Red, green, blue, (ROWS, columns, 3); the number of columns is even, as video encoders ask for.
     """
     seen = Image.fromarray(picture)
     seen = seen.resize((_even(ROWS * seen.width / seen.height), ROWS), Image.Resampling.NEAREST)
@@ -69,15 +63,7 @@ ValueRange = tuple[float, float]
 
 
 def read_theta(given: Mapping[str, Any], known: Mapping[str, Parameter]) -> dict[str, ValueRange]:
-    """The interval of each parameter, of no width where its value is fixed.
-
-    Args:
-        given: A number, or low and high, by the parameter's name.
-        known: The parameters there are.
-
-    Raises:
-        InputError: With the parameter and the remedy.
-    """
+    """The interval of each parameter, given as a number, or low and high; of no width where its value is fixed."""
     if not isinstance(given, Mapping):
         raise InputError(f"theta: must give a value or [low, high] by parameter, got {given!r}")
     return {name: _interval(name, value, known) for name, value in given.items()}
@@ -109,13 +95,7 @@ TICK_S = 1.0 / driving.TICK_HZ
 
 
 class Tally:
-    """Adds up the parts of a drive, each scored as the task scores a whole one.
-
-    Args:
-        road: The map.
-        seconds: When time is over [s].
-        start: Starting pose (3,): x [m], y [m], heading [rad].
-    """
+    """Adds up the parts of a drive from a starting pose (3,), each scored as the task scores a whole one."""
 
     def __init__(self, road: driving.Road, seconds: float, start: Signal) -> None:
         self._road, self._seconds = road, seconds

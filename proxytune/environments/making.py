@@ -40,48 +40,28 @@ class OwnParameter:
 
 @dataclass(frozen=True)
 class EpisodeMetric:
-    """Rule by which an episode is scored.
+    """Rule by which an episode is scored."""
 
-    Attributes:
-        name: What the metric is called.
-        source: "return", "length", or "info".
-        entry: Which entry of info.
-        fold: One of FOLDS.
-        unit: Its unit, empty where it has none.
-    """
-
-    name: str
-    source: str
-    entry: str
-    fold: str
-    unit: str
+    name: str  # what the metric is called
+    source: str  # "return", "length", or "info"
+    entry: str  # which entry of info
+    fold: str  # one of FOLDS
+    unit: str  # its unit, empty where it has none
 
 
 @dataclass(frozen=True)
 class EnvironmentSettings:
-    """A [domain] table.
+    """A [domain] table."""
 
-    Attributes:
-        environment: A registered name, "module:Name-v0", or "module:attribute" of what makes one.
-        steps: Longest episode; None where the environment's own limit holds.
-        rate_hz: Steps per second of the simulated world; None where the environment is asked.
-        arguments: Fixed arguments of the constructor, sorted by name.
-        own: The environment's own parameters, in the order of the table.
-        metrics: What episodes are scored by.
-        state: Which entries of the observation are x, y and heading, if any.
-        effects: Values of effects that every instance has, sorted by name in θ.
-        folder: Where a user's modules lie.
-    """
-
-    environment: str
-    steps: int | None
-    rate_hz: float | None
-    arguments: tuple[tuple[str, Any], ...]
-    own: tuple[OwnParameter, ...]
-    metrics: tuple[EpisodeMetric, ...]
-    state: tuple[int, ...] | None
-    effects: tuple[tuple[str, float], ...]
-    folder: Path
+    environment: str  # a registered name, "module:Name-v0", or "module:attribute" of what makes one
+    steps: int | None  # longest episode; None where the environment's own limit holds
+    rate_hz: float | None  # steps per second of the simulated world; None where the environment is asked
+    arguments: tuple[tuple[str, Any], ...]  # fixed arguments of the constructor, sorted by name
+    own: tuple[OwnParameter, ...]  # the environment's own parameters, in the order of the table
+    metrics: tuple[EpisodeMetric, ...]  # what episodes are scored by
+    state: tuple[int, ...] | None  # which entries of the observation are x, y and heading, if any
+    effects: tuple[tuple[str, float], ...]  # values of effects that every instance has, sorted by name in θ
+    folder: Path  # where a user's modules lie
 
 
 def read_domain(section: Section) -> EnvironmentSettings:
@@ -126,9 +106,8 @@ def _read_parameter(tables: Section, name: str) -> OwnParameter:
     if low >= high:
         raise table.error("low", f"must be below high, got {low:g} and {high:g}")
     neutral = table.number("neutral", low=low, high=high)
-    return OwnParameter(
-        Parameter(name=name, unit=table.text("unit", ""), low=low, high=high, neutral=neutral), argument, attribute
-    )
+    parameter = Parameter(name=name, unit=table.text("unit", ""), low=low, high=high, neutral=neutral)
+    return OwnParameter(parameter, argument, attribute)
 
 
 def _read_metrics(section: Section) -> tuple[EpisodeMetric, ...]:
@@ -164,9 +143,6 @@ def make_environment(settings: EnvironmentSettings, theta: Mapping[str, float]) 
     """An environment whose own parameters have the values of θ, neutral where θ leaves them out.
 
     A module before the name is imported first, from the study's folder or as installed, so that it can register.
-
-    Raises:
-        InputError: If it cannot be made, or has no such attribute.
     """
     values = {one: float(theta.get(one.parameter.name, one.parameter.neutral)) for one in settings.own}
     arguments = {**dict(settings.arguments), **{one.argument: value for one, value in values.items() if one.argument}}

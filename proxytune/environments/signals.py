@@ -36,38 +36,21 @@ PICTURE = "uint8 pictures of shape (rows, columns, 3)"
 
 @dataclass(frozen=True)
 class Spaces:
-    """Facts about an environment; a text says why something is not to be had.
+    """Facts about an environment; a text says why something is not to be had."""
 
-    Attributes:
-        low: Smallest actions.
-        high: Largest actions; as many as there are actions.
-        no_actions: Why there are no Box actions that effects could bend, or empty.
-        picture: Rows and columns of the observed picture, or None.
-        no_picture: Why there is none, or empty.
-        no_state: Why no entries of the observation are known to be x, y and heading, or empty.
-        rate_hz: Steps per second; None where nobody says.
-        steps: Longest episode.
-        packages: Versions of what simulates, by package.
-    """
-
-    low: tuple[float, ...]
-    high: tuple[float, ...]
-    no_actions: str
-    picture: tuple[int, int] | None
-    no_picture: str
-    no_state: str
-    rate_hz: float | None
-    steps: int
-    packages: tuple[tuple[str, str], ...]
+    low: tuple[float, ...]  # smallest actions
+    high: tuple[float, ...]  # largest actions; as many as there are actions
+    no_actions: str  # why there are no Box actions that effects could bend, or empty
+    picture: tuple[int, int] | None  # rows and columns of the observed picture, or None
+    no_picture: str  # why there is none, or empty
+    no_state: str  # why no entries of the observation are known to be x, y and heading, or empty
+    rate_hz: float | None  # steps per second; None where nobody says
+    steps: int  # longest episode
+    packages: tuple[tuple[str, str], ...]  # versions of what simulates, by package
 
 
 def look_at(settings: EnvironmentSettings) -> Spaces:
-    """Make the environment once and see what it is.
-
-    Raises:
-        InputError: If it cannot be made.
-        SettingsError: If its settings do not fit it.
-    """
+    """Make the environment once and see what it is; refused if its settings do not fit it."""
     environment = make_environment(settings, {})
     try:
         box = gymnasium.spaces.Box
@@ -230,18 +213,13 @@ TIMES = {"s", "min", "Hz"}
 class EnvironmentParameters(Mapping[str, Parameter]):
     """Parameters by their names in θ; a user's own effects answer where they are asked for by name.
 
-    Attributes:
-        own: Of the environment.
-        catalogue: The effects that there are.
-        spaces: What they would wrap.
-
     Raises:
         ExtensionError: If an effect that is asked for cannot wrap the environment, with the reason.
     """
 
-    own: tuple[OwnParameter, ...]
-    catalogue: Catalogue
-    spaces: Spaces
+    own: tuple[OwnParameter, ...]  # of the environment
+    catalogue: Catalogue  # the effects that there are
+    spaces: Spaces  # what they would wrap
 
     def __getitem__(self, name: str) -> Parameter:
         for one in self.own:
@@ -266,12 +244,8 @@ class EnvironmentParameters(Mapping[str, Parameter]):
         return sum(1 for _ in self)
 
     def _refusal(self, name: str, parameter: Parameter) -> str:
-        kind = self.catalogue.effect(name)
-        return (
-            _of_stage(kind, self.spaces)
-            or _of_wheels(name, kind, parameter, self.spaces)
-            or _of_needs(kind, self.spaces)
-        )
+        kind, spaces = self.catalogue.effect(name), self.spaces
+        return _of_stage(kind, spaces) or _of_wheels(name, kind, parameter, spaces) or _of_needs(kind, spaces)
 
 
 def _of_stage(kind: type[Effect], spaces: Spaces) -> str:

@@ -11,7 +11,7 @@ import sys
 import threading
 import time
 from collections import Counter, deque
-from collections.abc import Callable, Generator, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import CancelledError, Future
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ from uuid import uuid4
 
 from proxytune.errors import ExtensionError, InputError, RunError, to_install
 from proxytune.running.sending import OtherCodeError, Recipe, check_code, do_sent, made_by
-from proxytune.running.workers import LOST, START_S, AwakeClock, elsewhere
+from proxytune.running.workers import LOST, START_S, AwakeClock, Numbered, NumberedResults, elsewhere
 
 CONNECT_S, JOINED_S = 10.0, 30.0
 """So long it is waited for a connection, and for the first worker [s]."""
@@ -68,21 +68,13 @@ def on_cluster(address: str, say: Callable[[str], None] = _say) -> Iterator[None
 
 @dataclass
 class _Worker:
-    """A worker as the scheduler last told of it.
+    """A worker as the scheduler last told of it."""
 
-    Attributes:
-        address: Where it is.
-        told: When the scheduler last heard of it, by the scheduler's clock.
-        heard: When that was last seen to change, by ours [s].
-        unfit: Why it is not used; empty if it is.
-        running: Whether it takes work.
-    """
-
-    address: str
-    told: float
-    heard: float
-    unfit: str
-    running: bool
+    address: str  # where it is
+    told: float  # when the scheduler last heard of it, by the scheduler's clock
+    heard: float  # when that was last seen to change, by ours [s]
+    unfit: str  # why it is not used; empty if it is
+    running: bool  # whether it takes work
 
 
 @dataclass
@@ -99,16 +91,11 @@ class _Held:
     since: float
     left_behind: bool = False
 
-    @property
-    def pending(self) -> bool:
-        """Whether nothing has become of it yet, as far as is known."""
-        return not self.result.done()
-
 
 class _Pieces:
     """The pieces to do, in their order; those that come back are handed out first."""
 
-    def __init__(self, numbered: Iterator[tuple[int, Any]]) -> None:
+    def __init__(self, numbered: Iterator[Numbered]) -> None:
         self._left, self._open, self._back = numbered, dict[int, Any](), deque[int]()
         self._deaths = Counter[int]()
 
@@ -124,7 +111,7 @@ class _Pieces:
             self._back.append(number)
             return
 
-    def next(self) -> tuple[int, Any] | None:
+    def next(self) -> Numbered | None:
         """A piece to hand out; None if there is none."""
         if not self._back:
             self._begin()
@@ -169,9 +156,7 @@ class _Patience:
 def _wait_for_scheduler(address: str) -> None:
     """Wait until what listens there greets as a scheduler does: Dask's own client waits without end for what is none.
 
-    Raises:
-        OSError: If nothing does within CONNECT_S.
-        ValueError: If the address is none.
+    Raises OSError if nothing does within CONNECT_S, ValueError if the address is none.
     """
     scheme, _, place = address.rpartition("://")
     if scheme not in ("", "tcp"):
@@ -310,9 +295,7 @@ class Cluster:
         result.add_done_callback(lambda _: self._woken.set())
         return result
 
-    def results(
-        self, recipe: Recipe, numbered: Iterator[tuple[int, Any]], timeout_s: float | None
-    ) -> Generator[tuple[int, Any], None, None]:
+    def results(self, recipe: Recipe, numbered: Iterator[Numbered], timeout_s: float | None) -> NumberedResults:
         """Do numbered pieces; LOST stands for the result of one that ended several workers, or takes too long."""
         pieces, held, patience = _Pieces(numbered), dict[Key, _Held](), _Patience(self._say)
         try:
@@ -326,11 +309,12 @@ class Cluster:
                 self._woken.wait(POLL_S)
                 self._woken.clear()
                 for key, one in list(held.items()):
-                    came = self._under_way(key, one, pieces, timeout_s) if one.pending else self._ended(key, one)
+                    over = one.result.done()
+                    came = self._ended(key, one) if over else self._under_way(key, one, pieces, timeout_s)
                     if came is _UNDER_WAY:
                         continue
                     # A worker that was left behind is not free before it has ended what it has.
-                    if not (one.left_behind and one.pending and key in self._workers):
+                    if one.result.done() or not (one.left_behind and key in self._workers):
                         del held[key]
                     if came is not _AGAIN:
                         if pieces.done(one.number):

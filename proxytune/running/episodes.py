@@ -37,25 +37,18 @@ Seconds = Mapping[tuple[str, int], float]
 
 @dataclass(frozen=True)
 class Watch:
-    """How episodes are watched that may end their process or never end, and what is known of them.
+    """How episodes are watched that may end their process or never end, and what is known of them."""
 
-    Attributes:
-        timeout_s: How long an episode may take [s]; one that takes longer by itself has failed. None for as long as it
-            takes.
-        suspect: Whether an episode is run in a process of its own at once, as an earlier process ended during its like.
-        begins: Told of the episodes that begin in this very process, which they may end.
-        waits: Told again and again, where nothing limits it, which fleet has been under way longest, if that is long,
-            and for how long [s]; from another thread.
-        alone: Agents that are not run beside others.
-        known: How long episodes took before.
-    """
-
-    timeout_s: float | None = None
+    timeout_s: float | None = None  # how long an episode may take by itself [s] before it has failed
+    # whether an episode is run in a process of its own at once, as an earlier process ended during its like
     suspect: Callable[[Episode], bool] = lambda _: False
+    # told of the episodes that begin in this very process, which they may end
     begins: Callable[[Fleet], None] = lambda _: None
+    # told again and again, where nothing limits it, which fleet has been under way longest, if that is long, and for
+    # how long [s]; from another thread
     waits: Callable[[str, float], None] = lambda what, seconds: None
-    alone: Collection[str] = ()
-    known: Seconds = field(default_factory=dict)
+    alone: Collection[str] = ()  # agents that are not run beside others
+    known: Seconds = field(default_factory=dict)  # how long episodes took before
 
     def rescue(self, times: float, lost: Callable[[Fleet, WorkerExit], Result]) -> Rescue[Fleet, Result]:
         """The rescue of fleets that are watched so too, and may take so many times as long as an episode."""
@@ -77,15 +70,9 @@ def running(
 ) -> Iterator[Iterator[list[Outcome]]]:
     """Run episodes and give the outcomes of a fleet as soon as they are there, in no particular order; see `working`.
 
-    An episode that ends two processes, the second one its own, has failed, and so has one that takes too long.
-
-    Args:
-        family: Where they run; only a `domain.FleetFamily` has fleets of more than one episode.
-        episodes: Which, those that take longest first.
-        jobs: How many processes.
-        skip: Whether an episode need not be run any more, asked when its fleet is about to begin.
-        needed: As of run_episode.
-        watch: How they are watched.
+    An episode that ends two processes, the second one its own, has failed, and so has one that takes too long. Those
+    that take longest come first; whether to `skip` one is asked when its fleet is about to begin. Only a
+    `domain.FleetFamily` has fleets of more than one episode.
 
     Raises:
         RunError: If the machine fails rather than an episode: memory, disk or descriptors run out.
@@ -132,18 +119,11 @@ def in_fleets(
     known: Seconds,
     most_s: float = MOST_S,
 ) -> Iterator[Fleet]:
-    """Cut episodes into fleets, each when a process asks for it, by what is known then.
+    """Cut episodes, the longest first, into fleets, each when a process asks for it, by what is known then.
 
-    All processes have as much to do: episodes are dealt out, the longest first, to as many fleets as it takes, or to a
-    multiple of `jobs`. As long as nothing is known of how long they take, fleets are small.
-
-    Args:
-        episodes: Which, those that take longest first.
-        jobs: How many processes are to be kept busy.
-        apart: Whether an episode is a fleet of its own.
-        skip: Whether an episode need not be run any more, asked when its fleet is about to begin.
-        known: How long they took before.
-        most_s: How long a fleet may take [s].
+    All processes have as much to do: episodes are dealt out to as many fleets as it takes, or to a multiple of `jobs`.
+    As long as nothing is known of how long they take, fleets are small. One that is `apart` is a fleet of its own;
+    whether to `skip` one is asked when its fleet is about to begin.
     """
     single = [one for one in episodes if apart(one)]
     left = [one for one in episodes if not apart(one)]
@@ -172,10 +152,8 @@ def _lost(watch: Watch, episode: Episode, end: WorkerExit) -> Outcome:
     """The outcome of an episode that has ended its process, or was ended."""
     where = f"agent '{episode.agent}' from start {episode.start}"
     if end.killed:
-        raise RunError(
-            f"{where}: its process was killed twice ({end.how}; out of memory?); run again to continue, with more "
-            "memory or without that agent"
-        )
+        remedy = "run again to continue, with more memory or without that agent"
+        raise RunError(f"{where}: its process was killed twice ({end.how}; out of memory?); {remedy}")
     failure = f"{ENDED} twice ({end.how})" if end.how else f"{ENDLESS} {watch.timeout_s:g} s"
     return Outcome(episode, None, failure, end.seconds)
 

@@ -29,12 +29,7 @@ OF_THE_MACHINE = (errno.ENOSPC, errno.EDQUOT, errno.ENOMEM, errno.EMFILE, errno.
 
 
 def run_fleet(family: DomainFamily, episodes: Sequence[Episode], needed: Collection[str] = ()) -> list[Outcome]:
-    """Run episodes, side by side where the family can, and give each the outcome that it has by itself.
-
-    Args:
-        family: Where they run.
-        episodes: Which; a single one is run by itself.
-        needed: As of run_episode.
+    """Run episodes, side by side where the family can, and give each the outcome that `run_episode` gives it.
 
     Raises:
         RunError: As run_episode.
@@ -88,11 +83,7 @@ def run_episode(family: DomainFamily, episode: Episode, needed: Collection[str] 
     """Run one episode on one thread; what the agent or the domain does wrong is its outcome.
 
     What it draws from `random` and `numpy.random`, which belong to the whole process, follows from the episode's seed.
-
-    Args:
-        family: Where it runs.
-        episode: Which one.
-        needed: The metrics without which it has failed; others may be missing. All, where none is named.
+    Metrics that are not needed may be missing; where none is named, all are.
 
     Raises:
         RunError: If memory, disk or descriptors run out: that is not the episode's doing.
@@ -114,20 +105,15 @@ def run_episode(family: DomainFamily, episode: Episode, needed: Collection[str] 
 def check_machine(whose: str, problem: BaseException | None, remedy: str) -> None:
     """Refuse to call something failed of what memory, disk or descriptors lacked, whoever caught that first.
 
-    Args:
-        whose: What was under way, as the complaint begins.
-        problem: What was raised.
-        remedy: How to run again, as the complaint ends.
+    The complaint begins with what was under way, and ends with how to run again.
 
     Raises:
         RunError: With what the machine lacked.
     """
     while problem is not None:
         if isinstance(problem, MemoryError) or getattr(problem, "errno", None) in OF_THE_MACHINE:
-            where = place_of(problem)
-            raise RunError(
-                f"{whose}: the machine failed ({describe(problem)}){where}; run again to continue, {remedy}"
-            ) from None
+            failed = f"the machine failed ({describe(problem)}){place_of(problem)}"
+            raise RunError(f"{whose}: {failed}; run again to continue, {remedy}") from None
         problem = problem.__cause__ or problem.__context__
 
 
@@ -141,11 +127,7 @@ def _failure(problem: BaseException) -> str:
 
 @contextmanager
 def _seeded(seed: int) -> Iterator[Callable[[], bool]]:
-    """Let the generators of the whole process draw from a seed, and go on afterwards as if they had not.
-
-    Yields:
-        Tells whether anything has been drawn from them meanwhile.
-    """
+    """Let the process's generators draw from a seed, then go on as if they had not; gives what tells if any drew."""
     plain, array = random.getstate(), np.random.get_state()
     random.seed(seed)
     np.random.seed(seed % 2**32)

@@ -26,23 +26,18 @@ class Watcher(Protocol):
 
     def begin(self, what: str, known: int) -> None:
         """Something of several episodes begins, so many of which are known already."""
-        ...
 
     def episode(self) -> None:
         """One more episode has been run."""
-        ...
 
     def best(self, score: float) -> None:
         """The lowest score so far."""
-        ...
 
     def finished(self, what: str) -> None:
         """A trial, a point or a run is finished; what became of it, in one line."""
-        ...
 
     def waiting(self, episode: str, seconds: float) -> None:
         """An episode that nothing ends has been under way for so long, and still is; told by another thread."""
-        ...
 
 
 class Silent:
@@ -108,11 +103,7 @@ def watching(progress: bool, total: int, unit: str = "episodes") -> AbstractCont
 
 
 class Lines:
-    """Plain lines on standard error, each after the seconds so far; on a terminal few, since a bar is there.
-
-    Attributes:
-        console: Standard error.
-    """
+    """Plain lines on standard error, each after the seconds so far; on a terminal few, since a bar is there."""
 
     def __init__(self) -> None:
         self.console = Console(stderr=True)
@@ -125,9 +116,8 @@ class Lines:
 
     def put(self, line: str) -> None:
         """Write one line on a terminal too, above its bar."""
-        self.console.print(
-            f"{time.monotonic() - self._began:.0f} s: {line}", highlight=False, markup=False, soft_wrap=True
-        )
+        told = f"{time.monotonic() - self._began:.0f} s: {line}"
+        self.console.print(told, highlight=False, markup=False, soft_wrap=True)
 
 
 def progress_bar(

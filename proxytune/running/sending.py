@@ -40,21 +40,13 @@ class OtherCodeError(InputError):
 
 @dataclass(frozen=True)
 class Recipe:
-    """Work pickled once, and where its modules are found: a process unpickles it once.
+    """Work pickled once, and where its modules are found: a process unpickles it once."""
 
-    Attributes:
-        pickled: The work.
-        path: Where modules are looked for here.
-        own: The user's folders whose modules it may need.
-        packed: The modules of these, for a machine that does not have the folders.
-        made_by: The code that another machine must have, by names and versions; none for processes of this one.
-    """
-
-    pickled: bytes
-    path: tuple[str, ...]
-    own: tuple[str, ...]
-    packed: Packed = ()
-    made_by: tuple[tuple[str, str], ...] = ()
+    pickled: bytes  # the work
+    path: tuple[str, ...]  # where modules are looked for here
+    own: tuple[str, ...]  # the user's folders whose modules it may need
+    packed: Packed = ()  # the modules of these, for a machine that does not have the folders
+    made_by: tuple[tuple[str, str], ...] = ()  # what code another machine must have, by names and versions
 
 
 def recipe_of(work: Callable[..., Any], made_by: Mapping[str, str] | None = None) -> Recipe:
@@ -117,11 +109,8 @@ def end_with(parent: int, safe_path: str | None) -> None:
     """End this process, which a parent has just started, with that parent and not before.
 
     After a `kill -9` it would wait for work for minutes. Ctrl-C, and the end of a terminal, reach every process of that
-    terminal; the parent answers them, and ends this one. Of a crash the parent tells in one line.
-
-    Args:
-        parent: Its number.
-        safe_path: What SAFE_PATH is to be for processes that this one starts.
+    terminal; the parent answers them, and ends this one. Of a crash the parent tells in one line. SAFE_PATH is set for
+    processes that this one starts.
     """
     _set_safe_path(safe_path)
     sys.stdout, sys.stderr = (cast(TextIO, LastingStream(one)) for one in (sys.stdout, sys.stderr))

@@ -42,15 +42,10 @@ Result = TypeVar("Result")
 
 @dataclass(frozen=True)
 class WorkerExit:
-    """The end of a process before its piece had a result.
+    """The end of a process before its piece had a result."""
 
-    Attributes:
-        how: In one phrase, as "SIGSEGV" or "exit status 3"; empty if it was ended because the piece took too long.
-        seconds: How long the piece took until then.
-    """
-
-    how: str
-    seconds: float
+    how: str  # in one phrase, as "SIGSEGV" or "exit status 3"; empty if it was ended because the piece took too long
+    seconds: float  # how long the piece took until then
 
     @property
     def killed(self) -> bool:
@@ -64,26 +59,25 @@ class Rescue(Generic[Piece, Result]):
 
     A process that dies is not known to have died of its piece: each part of that is done once more by an isolated
     worker, and lost if that dies too.
-
-    Attributes:
-        lost: The result of a piece that has no other, from how its process ended.
-        timeout_s: How long a piece may take [s]; then all are done in other processes.
-        suspect: Whether a piece is done by an isolated worker at once, because the like of it has ended a process.
-        begins: Told of each piece that begins in this very process, which it may end.
-        isolated: Whether no piece is done in this process, as one may end it.
-        parts: What a piece is done again by, each part by itself.
     """
 
-    lost: Callable[[Piece, WorkerExit], Result]
-    timeout_s: float | None = None
+    lost: Callable[[Piece, WorkerExit], Result]  # the result of a piece that has no other, from how its process ended
+    timeout_s: float | None = None  # how long a piece may take [s]; then all are done in other processes
+    # whether a piece is done by an isolated worker at once, because the like of it has ended a process
     suspect: Callable[[Piece], bool] = lambda _: False
+    # told of each piece that begins in this very process, which it may end
     begins: Callable[[Piece], None] = lambda _: None
-    isolated: bool = False
-    parts: Callable[[Piece], Sequence[Piece]] = lambda piece: (piece,)
+    isolated: bool = False  # whether no piece is done in this process, as one may end it
+    parts: Callable[[Piece], Sequence[Piece]] = lambda piece: (piece,)  # by what it is done again, each by itself
 
 
 LOST: Any = object()
 """Stands for the result of a piece that has none: it took too long, or ended processes."""
+
+
+Numbered = tuple[int, Any]
+"""A piece, or its result, with the piece's number."""
+NumberedResults = Generator[Numbered, None, None]
 
 
 class Place(Protocol):
@@ -94,13 +88,9 @@ class Place(Protocol):
 
     def cores(self) -> int:
         """The number of pieces that are done at once there, asked whenever there are pieces to do."""
-        ...
 
-    def results(
-        self, recipe: Recipe, numbered: Iterator[tuple[int, Any]], timeout_s: float | None
-    ) -> Generator[tuple[int, Any], None, None]:
+    def results(self, recipe: Recipe, numbered: Iterator[Numbered], timeout_s: float | None) -> NumberedResults:
         """Do numbered pieces, each asked for when it can begin; LOST stands for the result of one that is given up."""
-        ...
 
 
 _elsewhere: ContextVar[Place | None] = ContextVar("elsewhere", default=None)
@@ -176,13 +166,8 @@ def working(
     """Do pieces of work and give each result as soon as it is there, in no particular order.
 
     Which process does a piece, and after which, must not change its result. With several jobs, joblib's backend is
-    the caller's choice (processes of this machine by default). Leaving the context drops the pieces not yet done.
-
-    Args:
-        work: Does one piece; picklable.
-        pieces: What to do, in the order in which to begin; the next one is asked for when it is about to begin.
-        jobs: How many processes; with one, and no time-out, everything is done in this process.
-        rescue: What becomes of pieces that end their process; nothing else can be done without them.
+    the caller's choice (processes of this machine by default); with one, and no time-out, everything is done in this
+    process. The next piece is asked for when it is about to begin. Leaving the context drops those not yet done.
 
     Raises:
         RunError: If a process dies and there is no rescue.
@@ -204,10 +189,8 @@ def working(
 
 
 def _no_rescue(piece: Any, end: WorkerExit) -> Any:
-    raise RunError(
-        f"a process was killed twice by the same piece of work ({end.how}; out of memory?); run again to continue, "
-        "perhaps with jobs = 1"
-    )
+    told = f"a process was killed twice by the same piece of work ({end.how}; out of memory?)"
+    raise RunError(f"{told}; run again to continue, perhaps with jobs = 1")
 
 
 def _here(
@@ -271,9 +254,7 @@ def _spread(
         yield from _isolated(work, again, rescue)
 
 
-def _in_processes(
-    recipe: Recipe, numbered: Iterable[tuple[int, Any]], jobs: int, timeout_s: float | None
-) -> Generator[tuple[int, Any], None, None]:
+def _in_processes(recipe: Recipe, numbered: Iterable[Numbered], jobs: int, timeout_s: float | None) -> NumberedResults:
     # Only joblib's own processes are ours to end with this one.
     local = isinstance(get_active_backend()[0], BACKENDS["loky"])
     with away_from_here() as ours:
@@ -287,11 +268,11 @@ def _in_processes(
             **({"initializer": end_with, "initargs": ours} if local else {}),
         )
         tasks = (delayed(_do_numbered)(recipe, number, piece) for number, piece in numbered)
-        with closing(cast("Generator[tuple[int, Any], None, None]", parallel(tasks))) as results:
+        with closing(cast(NumberedResults, parallel(tasks))) as results:
             yield from results
 
 
-def _do_numbered(recipe: Recipe, number: int, piece: Any) -> tuple[int, Any]:
+def _do_numbered(recipe: Recipe, number: int, piece: Any) -> Numbered:
     return number, do_sent(recipe, piece)
 
 
@@ -313,15 +294,9 @@ class IsolatedWorker:
         self._end()
 
     def do(self, piece: Any, lost: Callable[[WorkerExit], Any], tries: int = 2) -> Any:
-        """Do a piece.
+        """Do a piece, unless the work cannot go to another process; `lost` gives the result if it ends its process.
 
-        Args:
-            piece: The piece.
-            lost: Its result where it ends its process, or takes longer than it may.
-            tries: How often it may take too long: the machine may have been at fault, or a process have been stopped.
-
-        Raises:
-            NotSendableError: If the work cannot go to another process.
+        Or if it takes too long in so many tries: the machine may have been at fault, or a process have been stopped.
         """
         if self._process is None:
             self._recipe = self._recipe or recipe_of(self._work)
@@ -374,15 +349,10 @@ _trace: ContextVar[Trace | None] = ContextVar("trace", default=None)
 
 @dataclass(frozen=True)
 class TracedTask:
-    """Work whose pieces keep what they are doing, for whoever asks after their process has ended.
+    """Work whose pieces keep what they are doing, for whoever asks after their process has ended."""
 
-    Attributes:
-        work: Does a piece, in a process that may be ended if a limit is set in it.
-        folder: Where the traces are; another machine need not have it.
-    """
-
-    work: Callable[[Any], Any]
-    folder: Path
+    work: Callable[[Any], Any]  # does a piece, in a process that may be ended if a limit is set in it
+    folder: Path  # where the traces are; another machine need not have it
 
     def __call__(self, piece: Any) -> Any:
         """Do a piece."""

@@ -73,9 +73,8 @@ def unit_points(dimensions: int, count: int, seed: int) -> NDArray[np.float64]:
     A longer answer begins with every shorter one.
     """
     exponent = max(0, math.ceil(math.log2(count)))
-    points: NDArray[np.float64] = qmc.Sobol(dimensions, scramble=True, rng=np.random.default_rng(seed)).random_base2(
-        exponent
-    )
+    sequence = qmc.Sobol(dimensions, scramble=True, rng=np.random.default_rng(seed))
+    points: NDArray[np.float64] = sequence.random_base2(exponent)
     return points[:count]
 
 

@@ -38,19 +38,14 @@ Limit = Literal["trials", "starts"]
 
 @dataclass(frozen=True)
 class Information:
-    """Information of the outputs on one parameter where θ is most probable.
+    """Information of the outputs on one parameter where θ is most probable."""
 
-    Attributes:
-        name: The parameter.
-        agents: Share of each agent in what is told, all its metrics together, most first; they add up to 1.
-        metrics: Share of each metric, all agents together, most first.
-        limit: What keeps more from being told: too few "trials" near the answer, so that the outputs are not known
-            there; or too few "starts", so that their means are rough and noisy.
-    """
-
-    name: str
+    name: str  # the parameter
+    # share of each agent in what is told, all its metrics together, most first; they add up to 1
     agents: tuple[tuple[str, float], ...]
-    metrics: tuple[tuple[str, float], ...]
+    metrics: tuple[tuple[str, float], ...]  # share of each metric, all agents together, most first
+    # what keeps more from being told: too few "trials" near the answer, so that the outputs are not known there; or too
+    # few "starts", so that their means are rough and noisy
     limit: Limit
 
 
@@ -101,19 +96,12 @@ UPPER = 97.5
 
 @dataclass(frozen=True, eq=False)
 class Knowledge:
-    """All that finished trials say of θ; everything is a function of them, the goal and the seed.
+    """All that finished trials say of θ; everything is a function of them, the goal and the seed."""
 
-    Attributes:
-        model: Of every output.
-        goal: The target.
-        trials: What it was learnt from.
-        seed: Seeds what is drawn.
-    """
-
-    model: OutputModel
-    goal: Goal
-    trials: tuple[Trial, ...]
-    seed: int
+    model: OutputModel  # of every output
+    goal: Goal  # the target
+    trials: tuple[Trial, ...]  # what it was learnt from
+    seed: int  # seeds what is drawn
 
     def of(self, goal: Goal) -> "Knowledge":
         """What the same outputs of the same trials say of another target: calibrated once where noise is the same.
@@ -280,15 +268,10 @@ class Knowledge:
 
 @dataclass(frozen=True, eq=False)
 class Expected:
-    """Knowledge of θ that a target not measured yet is expected to give.
+    """Knowledge of θ that a target not measured yet is expected to give."""
 
-    Attributes:
-        widths: Mean width of each parameter's 95 % interval, in widths of the box.
-        information: Each agent's and each metric's mean share in what is told of each parameter.
-    """
-
-    widths: Floats
-    information: tuple[Information, ...]
+    widths: Floats  # mean width of each parameter's 95 % interval, in widths of the box
+    information: tuple[Information, ...]  # each agent's and each metric's mean share in what is told of each parameter
 
 
 def expect_of(space: Space, trials: Sequence[Trial], goal: Goal, seed: int = 0) -> Expected:
@@ -314,9 +297,8 @@ def _mean_information(several: Sequence[Information]) -> Information:
 
     limits = [one.limit for one in several]
     agents, metrics = mean([one.agents for one in several]), mean([one.metrics for one in several])
-    return Information(
-        several[0].name, agents, metrics, "trials" if 2 * limits.count("trials") > len(limits) else "starts"
-    )
+    limit: Limit = "trials" if 2 * limits.count("trials") > len(limits) else "starts"
+    return Information(several[0].name, agents, metrics, limit)
 
 
 def learn_theta(space: Space, trials: Sequence[Trial], goal: Goal, seed: int = 0) -> Knowledge:
@@ -339,20 +321,14 @@ JITTER = 1e-8
 
 @dataclass(frozen=True)
 class Importance:
-    """A parameter's share in the variance of the score over the box (Sobol indices, θ uniform).
+    """A parameter's share in the variance of the score over the box (Sobol indices, θ uniform)."""
 
-    Attributes:
-        name: The parameter.
-        share: Of the posterior mean's variance, what the parameter takes part in, alone or together with others (the
-            total-effect index). Shares add up to 1 where parameters do not interact, and to more where they do.
-        interval: 95 % of the shares of functions drawn from the posterior, widened to hold the share itself.
-        alone: What the parameter does whatever the others are (the first-order index); not above the share.
-    """
-
-    name: str
+    name: str  # the parameter
+    # of the posterior mean's variance, what the parameter takes part in, alone or together with others (the
+    # total-effect index): shares add up to 1 where parameters do not interact, and to more where they do
     share: float
-    interval: tuple[float, float]
-    alone: float
+    interval: tuple[float, float]  # 95 % of the shares of functions drawn from the posterior, the share itself in it
+    alone: float  # what the parameter does whatever the others are (the first-order index); not above the share
 
 
 def importances(surrogate: Surrogate) -> tuple[Importance, ...]:
@@ -366,15 +342,8 @@ def importances(surrogate: Surrogate) -> tuple[Importance, ...]:
         share, alone = _indices(surrogate.mean(_points(len(names), POINTS)).reshape(2 + len(names), -1))
         drawn = _draws(surrogate, _points(len(names), DRAWN_POINTS)).reshape(DRAWS, 2 + len(names), -1)
     low, high = np.quantile(_indices(drawn)[0], LEVELS, axis=0)
-    return tuple(
-        Importance(
-            name=name,
-            share=float(share[column]),
-            interval=(float(min(low[column], share[column])), float(max(high[column], share[column]))),
-            alone=float(alone[column]),
-        )
-        for column, name in enumerate(names)
-    )
+    ends = zip(np.minimum(low, share).tolist(), np.maximum(high, share).tolist(), strict=True)
+    return tuple(map(Importance, names, share.tolist(), ends, alone.tolist()))
 
 
 def _points(dimensions: int, most: int) -> Floats:

@@ -242,9 +242,8 @@ def _group(kernel: "Kernel", visited: Floats, outputs: Floats, placement: Rows, 
         # What a placement does to an output all trials share that were driven under it; roughness is much the same.
         matrix += kernel.k2.noise_level * (placed[:, None] == placed)
     inverse = np.linalg.inv(matrix)
-    return OutputGroup(
-        columns, np.flatnonzero(rows), visited[rows], inverse, inverse @ ((known - middle) / scale), middle, scale
-    )
+    weights = inverse @ ((known - middle) / scale)
+    return OutputGroup(columns, np.flatnonzero(rows), visited[rows], inverse, weights, middle, scale)
 
 
 FREEDOM = 4.0

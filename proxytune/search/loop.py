@@ -50,7 +50,6 @@ class Proposer(Protocol):
 
     def propose(self, space: Space, trials: Sequence[Trial], seed: int) -> Values:
         """The next point; the same for the same trials in the order in which they were made, pending ones last."""
-        ...
 
 
 def batch_at(index: int, size: int, initial: int) -> range:
@@ -96,36 +95,24 @@ class Evaluator(Protocol):
 
     def trials(self) -> Sequence[Trial]:
         """The finished trials, in order."""
-        ...
 
     def ended(self) -> str:
         """The reason why the search goes no further, in one phrase; empty while it does."""
-        ...
 
     def evaluate(self, batch: range, propose: BatchPoints) -> None:
         """Score what is left of a batch of trials, counted from 0; `propose` gives the points of all of it."""
-        ...
 
 
 @dataclass(frozen=True)
 class Search:
-    """All that proposals are a function of, apart from the finished trials.
+    """All that proposals are a function of, apart from the finished trials."""
 
-    Attributes:
-        space: The box.
-        proposer: What proposes.
-        seed: Seed of all that is drawn.
-        budget: How many trials at most.
-        initial: How many of them come from the quasi-random design.
-        batch: How many are proposed together.
-    """
-
-    space: Space
-    proposer: Proposer
-    seed: int
-    budget: int
-    initial: int
-    batch: int = 1
+    space: Space  # the box
+    proposer: Proposer  # what proposes
+    seed: int  # seed of all that is drawn
+    budget: int  # how many trials at most
+    initial: int  # how many of them come from the quasi-random design
+    batch: int = 1  # how many are proposed together
 
     def run(self, evaluator: Evaluator) -> None:
         """Search from wherever the evaluator's trials were left.

@@ -78,38 +78,23 @@ Value = float | int | str | None
 
 @dataclass(frozen=True)
 class PastTrial:
-    """A trial that has ended.
+    """A trial that has ended."""
 
-    Attributes:
-        theta: Where it was.
-        state: Whether it was measured to its end, cut off before, or failed.
-        value: The objective there; None unless it was measured.
-        facts: What else is known of it, by name.
-    """
-
-    theta: Theta
-    state: Literal["finished", "cut", "failed"]
-    value: float | None
-    facts: Mapping[str, Value]
+    theta: Theta  # where it was
+    state: Literal["finished", "cut", "failed"]  # whether it was measured to its end, cut off before, or failed
+    value: float | None  # the objective there; None unless it was measured
+    facts: Mapping[str, Value]  # what else is known of it, by name
 
 
 @dataclass(frozen=True)
 class History:
-    """The trials of a search.
+    """The trials of a search."""
 
-    Attributes:
-        name: What the search is called.
-        space: The box that was searched.
-        trials: In their order.
-        maximise: Whether more of the objective is better.
-        answer: The place in `trials` of the one that the search holds for the best.
-    """
-
-    name: str
-    space: Space
-    trials: tuple[PastTrial, ...]
-    maximise: bool
-    answer: int
+    name: str  # what the search is called
+    space: Space  # the box that was searched
+    trials: tuple[PastTrial, ...]  # in their order
+    maximise: bool  # whether more of the objective is better
+    answer: int  # the place in `trials` of the one that the search holds for the best
 
 
 UNDATED = datetime(2000, 1, 1)

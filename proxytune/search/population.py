@@ -34,19 +34,12 @@ LEAST = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Population:
-    """Draws from what is known of a fleet, in the unit cube.
+    """Draws from what is known of a fleet, in the unit cube."""
 
-    Attributes:
-        mean: μ, shape (draws, parameters).
-        covariance: Σ between robots, shape (draws, parameters, parameters).
-        robots: θ of each robot given the whole fleet, shape (draws, robots, parameters).
-        next_robot: θ of a robot that has not been measured, shape (draws, parameters).
-    """
-
-    mean: Floats
-    covariance: Floats
-    robots: Floats
-    next_robot: Floats
+    mean: Floats  # μ, shape (draws, parameters)
+    covariance: Floats  # σ between robots, shape (draws, parameters, parameters)
+    robots: Floats  # θ of each robot given the whole fleet, shape (draws, robots, parameters)
+    next_robot: Floats  # θ of a robot that has not been measured, shape (draws, parameters)
 
     @cached_property
     def deviation(self) -> Floats:

@@ -247,17 +247,11 @@ LEAST = 1e-12
 
 @dataclass(frozen=True)
 class Misfit:
-    """The test of whether some θ explains the target's outputs.
+    """The test of whether some θ explains the target's outputs."""
 
-    Attributes:
-        deviance: Mean deviance of the target's outputs at its best θ; None where no output tells of θ.
-        expected: The same of trials left out, their middle: what a proxy that fits has.
-        p_value: How likely a proxy that fits is to be as far off; None with too few trials to tell.
-    """
-
-    deviance: float | None
-    expected: float | None
-    p_value: float | None
+    deviance: float | None  # mean deviance of the target's outputs at its best θ; None where no output tells of θ
+    expected: float | None  # the same of trials left out, their middle: what a proxy that fits has
+    p_value: float | None  # how likely a proxy that fits is to be as far off; None with too few trials to tell
 
     @property
     def fits(self) -> bool | None:

@@ -78,9 +78,8 @@ def engine_of(name: str, beside: Path | None = None) -> Engine:
     """
     shipped = {engine.name: engine for engine in ENGINES}
     if name not in shipped and ":" not in name and name not in plugins("engine", shipped):
-        raise InputError(
-            f"unknown engine '{name}' (your own is written module:attribute); {nearest(name, ENGINE_NAMES)}"
-        )
+        told = f"unknown engine '{name}' (your own is written module:attribute)"
+        raise InputError(f"{told}; {nearest(name, ENGINE_NAMES)}")
     engine = load(name, kind="engine", beside=beside, shipped=shipped)
     if not isinstance(engine, Engine):
         kind = type(engine).__name__

@@ -54,17 +54,11 @@ follows, so the surrogate never threads them exactly."""
 
 @dataclass(frozen=True)
 class Surrogate:
-    """The posterior of the score given the finished trials.
+    """The posterior of the score given the finished trials."""
 
-    Attributes:
-        space: The search box.
-        model: The fitted regressor, on the unit cube.
-        visited: The trials it was fitted to, in canonical order, without the failed ones.
-    """
-
-    space: Space
-    model: "GaussianProcessRegressor"
-    visited: tuple[Trial, ...]
+    space: Space  # the search box
+    model: "GaussianProcessRegressor"  # the fitted regressor, on the unit cube
+    visited: tuple[Trial, ...]  # the trials it was fitted to, in canonical order, without the failed ones
 
     @property
     def noise_deviation(self) -> float:
@@ -115,9 +109,8 @@ def fit_surrogate(space: Space, trials: Sequence[Trial]) -> Surrogate:
         raise RunError("no trial has a score, so there is nothing to learn from")
     unit = unit_array(space, [trial.values for trial in visited])
     scores = np.array([trial.score for trial in visited], dtype=float)
-    model = GaussianProcessRegressor(
-        kernel=prior_kernel(len(space.intervals)), optimizer=most_probable, normalize_y=True, noise="gaussian"
-    )
+    kernel = prior_kernel(len(space.intervals))
+    model = GaussianProcessRegressor(kernel=kernel, optimizer=most_probable, normalize_y=True, noise="gaussian")
     with threadpool_limits(limits=1), warnings.catch_warnings():
         # A hyperparameter at its bound is an answer, not a failure.
         warnings.simplefilter("ignore", ConvergenceWarning)
@@ -172,9 +165,8 @@ class GaussianProcess:
     def propose(self, space: Space, trials: Sequence[Trial], seed: int) -> Values:
         """The next point, a function of the set of trials and the seed alone; never a point visited or pending."""
         with threadpool_limits(limits=1):
-            return from_unit(
-                space, _most_promising(_fit_with_pending(space, trials), proposal_seed(seed, len(trials)))[0]
-            )
+            surrogate = _fit_with_pending(space, trials)
+            return from_unit(space, _most_promising(surrogate, proposal_seed(seed, len(trials)))[0])
 
 
 def expected_improvement(space: Space, trials: Sequence[Trial], seed: int) -> tuple[float, float]:

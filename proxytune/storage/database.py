@@ -160,14 +160,9 @@ def transaction(connection: sqlite3.Connection, path: Path) -> Iterator[sqlite3.
     """Have all that is written meanwhile be there at once, or nothing of it."""
     with sqlite_errors_as_store_errors(path):
         connection.execute("BEGIN IMMEDIATE")
-        try:
+        # It commits, or rolls back where a full disk has not done so already.
+        with connection:
             yield connection
-            connection.execute("COMMIT")
-        except BaseException:
-            # A full disk may have rolled back already.
-            with suppress(sqlite3.Error):
-                connection.execute("ROLLBACK")
-            raise
 
 
 def write_row(connection: sqlite3.Connection, table: str, row: Mapping[str, Any]) -> None:
@@ -260,10 +255,8 @@ def _explained(path: Path, problem: sqlite3.Error) -> StoreError:
 
 
 def _corrupt(path: Path, detail: str) -> DamagedError:
-    return DamagedError(
-        f"{path}: is damaged ({' '.join(detail.split())}); restore a copy, "
-        f"or keep what is whole: python -m proxytune repair {path.parent}"
-    )
+    remedy = f"restore a copy, or keep what is whole: python -m proxytune repair {path.parent}"
+    return DamagedError(f"{path}: is damaged ({' '.join(detail.split())}); {remedy}")
 
 
 def _check(connection: sqlite3.Connection, path: Path, writable: bool) -> int:
@@ -324,7 +317,9 @@ def _check_tables(connection: sqlite3.Connection, path: Path, version: int) -> N
 
 def _check_rows(connection: sqlite3.Connection, path: Path, version: int) -> None:
     """Refuse a database of which any row is not as it was written, or is there no more."""
-    with _one_moment(connection), readable_texts(connection):
+    # All is read as it was at one moment, whoever writes meanwhile.
+    connection.execute("BEGIN")
+    with connection, readable_texts(connection):
         rows, damage = counted(connection), []
         for table, columns in _columns(version).items():
             found = connection.execute(f"SELECT digest, {', '.join(columns)} FROM {table}").fetchall()
@@ -334,16 +329,6 @@ def _check_rows(connection: sqlite3.Connection, path: Path, version: int) -> Non
     if damage:
         remedy = f"run: python -m proxytune repair {path.parent}, which keeps all else"
         raise DamagedError(f"{path}: is damaged, or was edited by hand: {', '.join(damage)}; {remedy}")
-
-
-@contextmanager
-def _one_moment(connection: sqlite3.Connection) -> Iterator[None]:
-    """Have all be read as it was at one moment, whoever writes meanwhile."""
-    connection.execute("BEGIN")
-    try:
-        yield
-    finally:
-        connection.execute("COMMIT")
 
 
 @cache

@@ -108,7 +108,5 @@ def _open(path: Path) -> int:
 
 
 def _link(path: Path) -> StoreError:
-    return StoreError(
-        f"{path}: is a symbolic link, and running the study would write where it leads; "
-        "remove it, or put what it leads to in its place"
-    )
+    remedy = "remove it, or put what it leads to in its place"
+    return StoreError(f"{path}: is a symbolic link, and running the study would write where it leads; {remedy}")

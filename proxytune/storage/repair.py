@@ -25,19 +25,12 @@ WITH_A_GAP_BEFORE = """
 
 @dataclass(frozen=True)
 class Salvage:
-    """Rows kept of a damaged database.
+    """Rows kept of a damaged database."""
 
-    Attributes:
-        problem: What was wrong with it, in one line.
-        aside: Where the damaged one is now.
-        kept: Rows by table.
-        lost: Rows by table that were counted or could be read, and are not kept.
-    """
-
-    problem: str
-    aside: Path
-    kept: Mapping[str, int]
-    lost: Mapping[str, int]
+    problem: str  # what was wrong with it, in one line
+    aside: Path  # where the damaged one is now
+    kept: Mapping[str, int]  # rows by table
+    lost: Mapping[str, int]  # rows by table that were counted or could be read, and are not kept
 
 
 def salvage(folder: Path) -> Salvage | None:

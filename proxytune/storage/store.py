@@ -29,33 +29,20 @@ Made = TypeVar("Made")
 
 @dataclass(frozen=True)
 class TrialRecord:
-    """One trial of a study.
+    """One trial of a study."""
 
-    Attributes:
-        number: Counted from 1.
-        theta: Where it was.
-        state: Whether it has been scored, has failed, was cut off, or is still open.
-        score: What the search makes small: the objective, with its sign turned if it is to be large; of a trial that
-            was cut off, what that is expected to be. None if it failed or is open.
-        measures: Every measure of it by name, the objective's among them; None where one is undefined. Empty unless
-            finished.
-        failed_episodes: How many of its episodes failed.
-        failure: Why it failed, empty if it did not.
-        decided: The agents that had been driven when it was cut off; empty if it was not.
-        bound: What its PRPV cannot be below, None unless it was cut off.
-        seconds: How long it took, where its episodes do not tell.
-    """
-
-    number: int
-    theta: Theta
-    state: State = "open"
+    number: int  # counted from 1
+    theta: Theta  # where it was
+    state: State = "open"  # whether it has been scored, has failed, was cut off, or is still open
+    # what the search makes small: the objective, with its sign turned if it is to be large; of a trial that was cut
+    # off, what that is expected to be; None if it failed or is open
     score: float | None = None
-    measures: Mapping[str, float | None] = field(default_factory=dict)
-    failed_episodes: int = 0
-    failure: str = ""
-    decided: tuple[str, ...] = ()
-    bound: float | None = None
-    seconds: float = 0.0
+    measures: Mapping[str, float | None] = field(default_factory=dict)  # by name, the objective's too; None: undefined
+    failed_episodes: int = 0  # how many of its episodes failed
+    failure: str = ""  # why it failed, empty if it did not
+    decided: tuple[str, ...] = ()  # the agents that had been driven when it was cut off; empty if it was not
+    bound: float | None = None  # what its PRPV cannot be below, None unless it was cut off
+    seconds: float = 0.0  # how long it took, where its episodes do not tell
 
     @property
     def prpv(self) -> float | None:
@@ -75,21 +62,13 @@ class TrialRecord:
 
 @dataclass(frozen=True)
 class SweepRecord:
-    """A sweep that has been asked for.
+    """A sweep that has been asked for."""
 
-    Attributes:
-        parameter: What is swept.
-        base: Values of the others; those not named are nominal.
-        points: Where it is looked at, in rising order.
-        target_model: The target's model.toml as it was when POD was asked for; empty where it was not.
-        replays: Identity of the domain family whose episodes are POD's replays; empty without POD.
-    """
-
-    parameter: str
-    base: Theta
-    points: tuple[float, ...]
-    target_model: str = ""
-    replays: str = ""
+    parameter: str  # what is swept
+    base: Theta  # values of the others; those not named are nominal
+    points: tuple[float, ...]  # where it is looked at, in rising order
+    target_model: str = ""  # the target's model.toml as it was when POD was asked for; empty where it was not
+    replays: str = ""  # identity of the domain family whose episodes are POD's replays; empty without POD
 
 
 class Store:
@@ -221,7 +200,7 @@ class Store:
         return self._made(_episode, query, (identity,))
 
     def begin_episode(self, identity: str, *episodes: Episode) -> None:
-        """Keep which episodes run in this very process, in place of those before: they may end the process."""
+        """Keep which episodes, if any, run in this very process now, not those before: they may end the process."""
         with self._transaction() as connection:
             connection.execute("DELETE FROM under_way")
             database.seal(connection, "under_way")
@@ -229,12 +208,6 @@ class Store:
                 which = {"theta": json.dumps(dict(episode.theta)), "agent": episode.agent}
                 row = {"place": place, "identity": identity, "start": episode.start, "seed": episode.seed}
                 database.write_row(connection, "under_way", row | which)
-
-    def end_episodes(self) -> None:
-        """Keep that no episode is under way."""
-        with self._transaction() as connection:
-            connection.execute("DELETE FROM under_way")
-            database.seal(connection, "under_way")
 
     def agents_that_failed(self, *how: str) -> set[str]:
         """The agents with a failed episode, in any family, whose failure begins so."""
@@ -274,13 +247,9 @@ class Store:
     def save_sweep(self, identity: str, sweep: SweepRecord) -> None:
         """Remember that a sweep has been asked for in the domain family with this identity; it is the last one now."""
         with self._transaction() as connection:
-            row = {
-                "number": _next(connection, "number", "sweeps"),
-                "base": theta_json(sweep.base),
-                "points": json.dumps(sweep.points),
-                "identity": identity,
-            }
-            database.write_row(connection, "sweeps", vars(sweep) | row)
+            row = {"number": _next(connection, "number", "sweeps"), "identity": identity}
+            texts = {"base": theta_json(sweep.base), "points": json.dumps(sweep.points)}
+            database.write_row(connection, "sweeps", vars(sweep) | row | texts)
 
     def sweeps(self) -> list[tuple[str, SweepRecord]]:
         """Every sweep that has been asked for, the last one last, with the identity of its domain family."""

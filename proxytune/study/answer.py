@@ -46,10 +46,8 @@ NARROW = 1.0
 def run_stages(run: StudyRun, warn: Callable[[str], None], known: Sequence[Outcome | Theta] = ()) -> None:
     """Run a study to its end, from wherever it was left: pre-flight, trials, fresh episodes.
 
-    Args:
-        run: The study.
-        warn: Hears, before the first trial, of another search than before and of parameters without effect.
-        known: θ to try next, before what the search proposes, and outcomes that need not be simulated.
+    Before the first trial `warn` hears of another search than before and of parameters without effect. What is known
+    are θ to try next, before what the search proposes, and outcomes that need not be simulated.
 
     Raises:
         InputError, RunError: As `run_trials`.
@@ -107,21 +105,13 @@ class Finalist:
 
 @dataclass(frozen=True)
 class Confirmation:
-    """The answer of fresh episodes.
+    """The answer of fresh episodes."""
 
-    Attributes:
-        answer: The answer, its fresh episodes those of the repetitions that nothing was chosen by.
-        candidates: All finalists, the search's own favourite first.
-        episodes: How many fresh episodes each of these was driven in.
-        expected: What is expected of the answer; None if an agent failed in all its fresh episodes.
-        knowledge: What is known of θ, by trials and finalists together.
-    """
-
-    answer: Finalist
-    candidates: tuple[Finalist, ...]
-    episodes: int
-    expected: Expectation | None
-    knowledge: Knowledge
+    answer: Finalist  # the answer, its fresh episodes those of the repetitions that nothing was chosen by
+    candidates: tuple[Finalist, ...]  # all finalists, the search's own favourite first
+    episodes: int  # how many fresh episodes each of these was driven in
+    expected: Expectation | None  # what is expected of the answer; None if an agent failed in all its fresh episodes
+    knowledge: Knowledge  # what is known of θ, by trials and finalists together
 
     @property
     def repetitions(self) -> int:
@@ -299,10 +289,8 @@ def _answer(driven: Sequence[Finalist], learnt: Knowledge, again: Knowledge) -> 
     """
     by_values = {learnt.space.values(one.trial.theta): one for one in driven}
     own = learnt.expected_of({values: one.trial.score or 0.0 for values, one in by_values.items()})
-    expected = {
-        values: float(np.mean([own[values], *(score for score in one.scores if score is not None)]))
-        for values, one in by_values.items()
-    }
+    fresh = {values: [score for score in one.scores if score is not None] for values, one in by_values.items()}
+    expected = {values: float(np.mean([own[values], *scores])) for values, scores in fresh.items()}
     best = min(expected, key=expected.__getitem__)
     if False in (learnt.misfit.fits, again.misfit.fits):
         return by_values[best]

@@ -26,21 +26,13 @@ WITHIN = 1 / 30
 
 @dataclass(frozen=True)
 class Bank:
-    """A bank as it stands.
+    """A bank as it stands."""
 
-    Attributes:
-        settings: Of its study.
-        trials: How many trials it has.
-        expected: What a target measured from some first starts will tell, by their number.
-        needed: How many starts tell each parameter to `WITHIN`; None where more starts than there are would not.
-        units: The parameters' units by their names; "" where one has none.
-    """
-
-    settings: StudySettings
-    trials: int
-    expected: Mapping[int, Expected]
-    needed: Mapping[str, int | None]
-    units: Mapping[str, str]
+    settings: StudySettings  # of its study
+    trials: int  # how many trials it has
+    expected: Mapping[int, Expected]  # what a target measured from some first starts will tell, by their number
+    needed: Mapping[str, int | None]  # how many starts tell each parameter to `WITHIN`; None where all do not
+    units: Mapping[str, str]  # the parameters' units by their names; "" where one has none
 
     def widths(self, starts: int) -> dict[str, float]:
         """Mean width of each parameter's 95 % interval, by a target that is measured from so many starts."""
@@ -68,10 +60,8 @@ def run_bank(run: StudyRun) -> None:
     for first in range(done, settings.budget, TOGETHER):
         numbers = range(first, min(first + TOGETHER, settings.budget))
         points = [design_point(settings.space, index, settings.seed) for index in numbers]
-        trials = [
-            TrialRecord(index + 1, settings.space.theta(values), "finished")
-            for index, values in zip(numbers, points, strict=True)
-        ]
+        pairs = zip(numbers, map(settings.space.theta, points), strict=True)
+        trials = [TrialRecord(index + 1, theta, "finished") for index, theta in pairs]
         what = f"trials {first + 1} to {first + len(trials)} of {settings.budget}"
         outcomes = run.outcomes([episode for trial in trials for episode in run.episodes_of(trial)], what)
         if not first:

@@ -96,12 +96,7 @@ def _otherwise(run: StudyRun, source: Source, *keys: str) -> list[str]:
 
 @contextmanager
 def table_alone(study: Study) -> Iterator[StudyRun]:
-    """A bank of which nothing but its table is there, as a run that knows its trials; nothing is driven.
-
-    Raises:
-        InputError: If it has no table, or one of another study.
-        StoreError: If that is damaged.
-    """
+    """A bank of which nothing but its table is there, as a run that knows its trials; nothing is driven."""
     settings = replace(study.settings, learn_from=(BANK_FILE,))
     with TemporaryDirectory() as folder, Store.open(Path(folder)) as store:
         run, source = StudyRun(replace(study, settings=settings), store), read_source(settings, BANK_FILE)
@@ -148,11 +143,7 @@ def earlier_trials(run: StudyRun) -> tuple[Trial, ...]:
 
 
 def known_trials(run: StudyRun) -> tuple[Trial, ...]:
-    """All that is known before the first trial: of earlier studies, and of a cheaper proxy, which has no score here.
-
-    Raises:
-        StoreError: If they are not as we write them.
-    """
+    """All that is known before the first trial: of earlier studies, and of a cheaper proxy, which has no score here."""
     cheap = _copied(run, LOW) if run.settings.low_fidelity else []
     return (*earlier_trials(run), *(replace(trial, low_fidelity=True) for trial in cheap))
 
@@ -170,10 +161,8 @@ def _copied(run: StudyRun, key: str) -> list[Trial]:
     except (KeyError, TypeError, ValueError, AttributeError):
         raise StoreError(f"{run.store.path}: '{fact}' is not as proxytune writes it; restore a copy") from None
     values = np.concatenate([values, np.full((*shape[:2], 1), np.nan)], axis=2)[:, rows][:, :, metrics]
-    outputs = values.reshape(len(values), -1).tolist()
-    return [
-        Trial(theta, None, tuple(row), placement=place) for (place, theta), row in zip(placed, outputs, strict=True)
-    ]
+    pairs = zip(placed, values.reshape(len(values), -1).tolist(), strict=True)
+    return [Trial(theta, None, tuple(row), placement=place) for (place, theta), row in pairs]
 
 
 def read_source(settings: StudySettings, name: str, key: str = FULL) -> Source:

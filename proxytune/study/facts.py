@@ -15,8 +15,8 @@ noted beside (NOTED) is no part of the comparison: no trial depends on it.
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from types import MappingProxyType
+from dataclasses import replace
+from types import MappingProxyType, SimpleNamespace
 from typing import Any, NoReturn, cast
 
 from proxytune.domain import DomainFamily
@@ -174,10 +174,8 @@ def _changed(study: Study, store: Store, before: Mapping[str, Any], now: Mapping
     settings = study.settings
     where = f"{settings.path}: {settings.family_name and f'families.{settings.family_name}: '}"
     database = store.path if settings.family_name else store.path.name
-    return SettingsError(
-        f"{where}changed since the first trial: {', '.join(changes(before, now))}; "
-        f"put it back, or move {database} away to start again"
-    )
+    remedy = f"put it back, or move {database} away to start again"
+    return SettingsError(f"{where}changed since the first trial: {', '.join(changes(before, now))}; {remedy}")
 
 
 def _unreadable(
@@ -216,16 +214,6 @@ def _searches(store: Store) -> list[dict[str, Any]]:
     return known
 
 
-@dataclass(frozen=True)
-class DescribedFamily:
-    """A domain family as it had described itself when its study was run; it can drive nothing."""
-
-    identity: str
-    metrics: Mapping[str, str]
-    parameters: Mapping[str, Parameter]
-    starts: int
-
-
 def describe(study: Study, store: Store) -> None:
     """Keep what is needed to look at a study without its own code, if it has run any."""
     if str(study.settings.folder.resolve()) not in folders() and study.settings.family != GIVEN:
@@ -245,6 +233,7 @@ def describe(study: Study, store: Store) -> None:
 def _described(
     settings: StudySettings, store: Store, described: Mapping[str, Any]
 ) -> tuple[DomainFamily, Engine, Mapping[str, float] | None]:
+    """The domain family as it had described itself when its study was run, the engine, and the true θ."""
 
     def refuse(*_: Any) -> NoReturn:
         raise StoreError("a study that is only looked at proposes nothing")
@@ -255,7 +244,8 @@ def _described(
     }
     metrics = {str(name): str(unit) for name, unit in described["metrics"].items()}
     identity, starts = str(store.facts().get("identity", "")), int(described["starts"])
-    family = DescribedFamily(identity, metrics, MappingProxyType(parameters), starts)
+    # It can drive nothing.
+    family = SimpleNamespace(identity=identity, metrics=metrics, parameters=MappingProxyType(parameters), starts=starts)
     name, learns_from, truth = settings.engine, described["learns_from"], described["truth"]
     engine = engine_of(name) if name in ENGINE_NAMES else Engine(name, name, "", refuse, learns_from)
     return cast(DomainFamily, family), engine, dict(truth) if truth is not None else None

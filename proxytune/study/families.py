@@ -5,7 +5,7 @@
 """
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -33,19 +33,12 @@ RESAMPLES = 1000
 
 @dataclass(frozen=True)
 class TunedFamily:
-    """A domain family at the best θ that was found in its time.
+    """A domain family at the best θ that was found in its time."""
 
-    Attributes:
-        name: What study.toml calls it.
-        result: What its study has found.
-        seconds: How long the episodes of its trials took, divided by the processes that ran them [s].
-        episode_seconds: How long each episode at its best θ took [s], in the order in which all families have them.
-    """
-
-    name: str
-    result: StudyResult
-    seconds: float
-    episode_seconds: tuple[float, ...]
+    name: str  # what study.toml calls it
+    result: StudyResult  # what its study has found
+    seconds: float  # how long the episodes of its trials took, divided by the processes that ran them [s]
+    episode_seconds: tuple[float, ...]  # how long each episode at its best θ took [s], as in all families
 
     @property
     def theta(self) -> Theta:
@@ -60,51 +53,31 @@ class TunedFamily:
 
 @dataclass(frozen=True)
 class Lesson:
-    """The worth of a family at its best θ as a teacher.
+    """The worth of a family at its best θ as a teacher."""
 
-    Attributes:
-        theta: The best θ that taught.
-        zero_shot: Score on the target before any target sample; None where it could not teach.
-        needed: Target samples needed after it.
-        plv: Target samples saved.
-        more: How many more are needed after it than after the family of highest PLV; None of that one itself.
-        failure: Why it could not teach, empty if it could.
-    """
-
-    theta: Theta
-    zero_shot: float | None = None
-    needed: LearningEstimate | None = None
-    plv: LearningEstimate | None = None
-    more: LearningEstimate | None = None
-    failure: str = ""
+    theta: Theta  # the best θ that taught
+    zero_shot: float | None = None  # score on the target before any target sample; None where it could not teach
+    needed: LearningEstimate | None = None  # target samples needed after it
+    plv: LearningEstimate | None = None  # target samples saved
+    more: LearningEstimate | None = None  # needed beyond the family of highest PLV; None of that one
+    failure: str = ""  # why it could not teach, empty if it could
 
 
 @dataclass(frozen=True)
 class BestFamilies:
-    """The family that is best at something.
+    """The family that is best at something."""
 
-    Attributes:
-        best: Its name; None where that is not known.
-        alike: The others that cannot be told from it.
-    """
-
-    best: str | None = None
-    alike: tuple[str, ...] = ()
+    best: str | None = None  # its name; None where that is not known
+    alike: tuple[str, ...] = ()  # the others that cannot be told from it
 
 
 @dataclass(frozen=True)
 class ComparedFamilies:
-    """Several tuned families.
+    """Several tuned families."""
 
-    Attributes:
-        settings: Of the study that they are of.
-        families: In the order of study.toml.
-        lessons: What each is worth as a teacher, by name; empty where that was not asked for, or is not known yet.
-    """
-
-    settings: StudySettings
-    families: tuple[TunedFamily, ...]
-    lessons: Mapping[str, Lesson] = field(default_factory=dict)
+    settings: StudySettings  # of the study that they are of
+    families: tuple[TunedFamily, ...]  # in the order of study.toml
+    lessons: Mapping[str, Lesson] = field(default_factory=dict)  # by name; empty where not asked for, or not known
 
     @cached_property
     def selection(self) -> Selection | None:
@@ -146,32 +119,28 @@ class ComparedFamilies:
     @property
     def cheapest(self) -> BestFamilies:
         """The one whose episodes take the shortest."""
-        best = min(self.families, key=lambda one: float(np.mean(one.episode_seconds))).name
+        best = min(self._costs, key=lambda name: self._costs[name][0])
         alike = [name for name, (_, low, _) in self.times_cheapest(best).items() if name != best and low <= 1.0]
         return BestFamilies(best, tuple(alike))
 
     def seconds_per_episode(self) -> dict[str, tuple[float, float, float]]:
         """Mean seconds of an episode of each family, and the ends of its 95 % interval."""
-        return {one.name: (float(np.mean(one.episode_seconds)), *interval(means)) for one, means in self._resampled()}
+        return {name: (mean, *interval(drawn)) for name, (mean, drawn) in self._costs.items()}
 
     def times_cheapest(self, cheapest: str) -> dict[str, tuple[float, float, float]]:
         """The ratio of each one's mean seconds of an episode to this family's, with 95 % intervals, paired."""
-        base, resampled = next((one, means) for one, means in self._resampled() if one.name == cheapest)
-        shortest = float(np.mean(base.episode_seconds))
-        return {
-            one.name: (float(np.mean(one.episode_seconds)) / shortest, *interval(means / resampled))
-            for one, means in self._resampled()
-        }
+        shortest, resampled = self._costs[cheapest]
+        return {name: (mean / shortest, *interval(drawn / resampled)) for name, (mean, drawn) in self._costs.items()}
 
-    def _resampled(self) -> list[tuple[TunedFamily, Floats]]:
-        """Each family with the means of its episodes' seconds when episodes are drawn, alike in all."""
-
-        def means(seconds: Sequence[float]) -> Floats:
-            count = len(seconds)
+    @cached_property
+    def _costs(self) -> dict[str, tuple[float, Floats]]:
+        """The mean of each family's episodes' seconds, and such means when episodes are drawn, alike in all."""
+        costs = {}
+        for one in self.families:
+            count, seconds = len(one.episode_seconds), np.array(one.episode_seconds)
             drawn = np.random.default_rng(0).multinomial(count, np.full(count, 1 / count), size=RESAMPLES)
-            return np.asarray(drawn @ np.array(seconds) / count)
-
-        return [(one, means(one.episode_seconds)) for one in self.families]
+            costs[one.name] = float(seconds.mean()), np.asarray(drawn @ seconds / count)
+        return costs
 
 
 def tuned_family(run: StudyRun, result: StudyResult) -> TunedFamily:

@@ -6,6 +6,8 @@ study's own are all there (`read_target`). The objective is a measure of how far
 mean scores, PRPV unless study.toml says otherwise; what others bring as a measure is tried before any episode is run.
 """
 
+import functools
+import itertools
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
@@ -149,34 +151,25 @@ def measure_of(name: str, beside: Path | None = None) -> Measure:
 
 def _as_objective(name: str, measure: Measure) -> Objective:
     if measure.on_means is None or measure.per_metric:
-        raise ExtensionError(
-            f"measure '{name}' is no single number of mean scores: it needs on_means, without per_metric"
-        )
+        told = f"measure '{name}' is no single number of mean scores"
+        raise ExtensionError(f"{told}: it needs on_means, without per_metric")
     of_means = measure.on_means
     if measure not in MEASURES:
-        of_means = _CheckedMeasure(name, measure.on_means)
+        of_means = functools.partial(_of_users_measure, name, measure.on_means)
         # Tried as a search calls it: several proxies against one target, before any episode is run.
         means = np.random.default_rng(0).uniform(1.0, 2.0, TRIED)
         of_means(means, means[0], [Metric("one"), Metric("other", "min")])
     return Objective(name, measure.name, not measure.lower_is_better, of_means)
 
 
-@dataclass(frozen=True)
-class _CheckedMeasure:
+def _of_users_measure(name: str, on_means: OfMeans, proxy: Floats, target: Floats, metrics: Sequence[Metric]) -> Floats:
     """A measure of mean scores that is not ours: what it does wrong is told in one line."""
-
-    name: str
-    on_means: OfMeans
-
-    def __call__(self, proxy: Floats, target: Floats, metrics: Sequence[Metric]) -> Floats:
-        where = f" for means {proxy.shape} against {target.shape}"
-        values = ask(
-            f"measure '{self.name}'", lambda: np.asarray(self.on_means(proxy, target, metrics), dtype=float), where
-        )
-        if values.shape != proxy.shape[:-2]:
-            told = f"measure '{self.name}' gives values {values.shape} of means {proxy.shape}"
-            raise ExtensionError(f"{told}; give one for each table, {proxy.shape[:-2]}")
-        return values
+    where = f" for means {proxy.shape} against {target.shape}"
+    values = ask(f"measure '{name}'", lambda: np.asarray(on_means(proxy, target, metrics), dtype=float), where)
+    if values.shape != proxy.shape[:-2]:
+        told = f"measure '{name}' gives values {values.shape} of means {proxy.shape}"
+        raise ExtensionError(f"{told}; give one for each table, {proxy.shape[:-2]}")
+    return values
 
 
 KEPT = {one.key: _as_objective(one.key, one) for one in MEASURES if one.on_means is not None and not one.per_metric}
@@ -186,30 +179,19 @@ PRPV = KEPT["prpv"]
 
 @dataclass(frozen=True)
 class Study:
-    """All that a trial is a function of, apart from θ.
+    """All that a trial is a function of, apart from θ."""
 
-    Attributes:
-        settings: What study.toml says.
-        family: The proxy's domain family.
-        target: The target's scores of the study's agents, in the study's order: the metrics by which they are compared,
-            then every other one that the family has too.
-        identity: What determines the result of an episode in the proxy, apart from the episode.
-        truth: The θ that made the target, where study.toml names a model of it; nothing depends on it.
-        cautions: What of study.toml or of the target's table is left out, in one line each.
-        objective: The measure that its trials make small or large.
-        engine: What proposes its trials after the design.
-        code: A digest of what the user's own code means; failures of other code are not remembered.
-    """
-
-    settings: StudySettings
-    family: DomainFamily
+    settings: StudySettings  # what study.toml says
+    family: DomainFamily  # the proxy's domain family
+    # the target's scores of the study's agents, in the study's order: the metrics by which they are compared, then
+    # every other one that the family has too
     target: ScoreTable
-    identity: str
-    truth: Theta | None = None
-    cautions: tuple[str, ...] = ()
-    objective: Objective = PRPV
-    engine: Engine = GAUSSIAN_PROCESS
-    code: str = ""
+    identity: str  # what determines the result of an episode in the proxy, apart from the episode
+    truth: Theta | None = None  # the θ that made the target, where study.toml names its model; no trial depends on it
+    cautions: tuple[str, ...] = ()  # what of study.toml or of the target's table is left out, in one line each
+    objective: Objective = PRPV  # the measure that its trials make small or large
+    engine: Engine = GAUSSIAN_PROCESS  # what proposes its trials after the design
+    code: str = ""  # a digest of what the user's own code means; failures of other code are not remembered
 
 
 def open_study(path: Path) -> Study:
@@ -244,13 +226,9 @@ def open_bank(settings: StudySettings) -> Study:
         InputError: If anything in it cannot be used.
     """
     family = load_family(settings, settings.proxy)
-    for metric in settings.metrics:
-        if metric.name not in family.metrics:
-            raise settings.error("metrics", f"unknown metric '{metric.name}'; {nearest(metric.name, family.metrics)}")
     names = dict.fromkeys((*(metric.name for metric in settings.metrics), *family.metrics))
-    table = ScoreTable.from_episodes(
-        {(agent, start): dict.fromkeys(names, 0.0) for agent in settings.agents for start in range(settings.starts)}
-    )
+    cells = itertools.product(settings.agents, range(settings.starts))
+    table = ScoreTable.from_episodes({cell: dict.fromkeys(names, 0.0) for cell in cells})
     return Study(settings, family, table, family.identity, code=user_code(settings))
 
 

@@ -52,25 +52,15 @@ LOOKS = 2
 
 @dataclass(frozen=True)
 class Movement:
-    """The effect on the metrics of moving one parameter across its box.
+    """The effect on the metrics of moving one parameter across its box."""
 
-    Attributes:
-        interval: The parameter and its box.
-        p_value: How likely noise alone is to change a metric as much, corrected for all tests; the lowest of them.
-        metric: The metric of that test.
-        change: Median over agents and starts of how much the parameter changes it.
-        noise: Median of how much noise does.
-        pairs: Over how many agents and starts; failed episodes are left out.
-        dead: Whether no metric of any of their episodes changed at all.
-    """
-
-    interval: Interval
-    p_value: float
-    metric: str
-    change: float
-    noise: float
-    pairs: int
-    dead: bool
+    interval: Interval  # the parameter and its box
+    p_value: float  # how likely noise alone is to change a metric as much, corrected for all tests; the lowest of them
+    metric: str  # the metric of that test
+    change: float  # median over agents and starts of how much the parameter changes it
+    noise: float  # median of how much noise does
+    pairs: int  # over how many agents and starts; failed episodes are left out
+    dead: bool  # whether no metric of any of their episodes changed at all
 
     @property
     def moves(self) -> bool:
@@ -162,10 +152,8 @@ def check_some_work(outcomes: Collection[Outcome], where: str) -> None:
 
     failures = [outcome for outcome in outcomes if outcome.metrics is None]
     if failures and len(failures) == len(outcomes) and len(set(map(kind, failures))) == 1:
-        raise RunError(
-            f"{failures[0].failure}; every agent fails so, in all {len(failures)} episodes of {where}: correct it and "
-            "run the same command again"
-        )
+        told = f"{failures[0].failure}; every agent fails so, in all {len(failures)} episodes of {where}"
+        raise RunError(f"{told}: correct it and run the same command again")
 
 
 PAIRS = 24
@@ -181,21 +169,13 @@ class Place(NamedTuple):
 
 @dataclass(frozen=True)
 class Preflight:
-    """The knowledge of a study of its parameters before its first trial.
+    """The knowledge of a study of its parameters before its first trial."""
 
-    Attributes:
-        base: The domain instance from which they were moved.
-        movements: One per parameter, in the order of the box.
-        episodes: How many episodes it took.
-        failure: Why the first of them failed, where all of them did; else empty.
-        not_repeatable: One line for each agent that scores otherwise when it drives the same episode again.
-    """
-
-    base: Theta
-    movements: tuple[Movement, ...]
-    episodes: int
-    failure: str = ""
-    not_repeatable: tuple[str, ...] = ()
+    base: Theta  # the domain instance from which they were moved
+    movements: tuple[Movement, ...]  # one per parameter, in the order of the box
+    episodes: int  # how many episodes it took
+    failure: str = ""  # why the first of them failed, where all of them did; else empty
+    not_repeatable: tuple[str, ...] = ()  # a line for each agent that scores otherwise in the same episode
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -219,7 +199,7 @@ def run_preflight(run: StudyRun) -> Preflight | None:
     """
     if run.finished_trials():
         return None
-    learnt = _preflight(run, functools.partial(_simulate, run))
+    learnt = _preflight(run, drive=True)
     if learnt is None or learnt.failure:
         return learnt
     first = _places(run.settings, 0)[0]
@@ -229,19 +209,10 @@ def run_preflight(run: StudyRun) -> Preflight | None:
 
 def preflight_of(run: StudyRun) -> Preflight | None:
     """The pre-flight from what has been simulated; None if it is off, or an episode is still missing."""
-    return _preflight(run, lambda look, added: None)
+    return _preflight(run, drive=False)
 
 
-def _simulate(run: StudyRun, look: int, added: Sequence[Episode]) -> None:
-    what = f"pre-flight {look + 1} of {LOOKS}"
-    run.watcher.begin(what, _most(run.settings, look) - len(added))
-    outcomes = run.outcomes(added, what)
-    run.watcher.finished(what)
-    if look == 0:
-        check_some_work(outcomes.values(), "the pre-flight")
-
-
-def _preflight(run: StudyRun, simulate: Callable[[int, Sequence[Episode]], None]) -> Preflight | None:
+def _preflight(run: StudyRun, *, drive: bool) -> Preflight | None:
     settings = run.settings
     if not settings.preflight:
         return None
@@ -250,7 +221,13 @@ def _preflight(run: StudyRun, simulate: Callable[[int, Sequence[Episode]], None]
     undecided = settings.space.intervals
     for look in range(LOOKS):
         before, now = (_plan(settings, _places(settings, n), undecided) for n in (look - 1, look))
-        simulate(look, now[len(before) :])
+        if drive:
+            what, added = f"pre-flight {look + 1} of {LOOKS}", now[len(before) :]
+            run.watcher.begin(what, _most(settings, look) - len(added))
+            outcomes = run.outcomes(added, what)
+            run.watcher.finished(what)
+            if look == 0:
+                check_some_work(outcomes.values(), "the pre-flight")
         known = run.known(now)
         if len(known) < len(now):
             return None

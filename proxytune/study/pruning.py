@@ -44,15 +44,6 @@ class PruningRule:
     disagreement: Floats
 
 
-@dataclass(frozen=True)
-class Pruned:
-    """A trial that was stopped: PRPV of the pairs decided is a bound, what is expected of all the estimate."""
-
-    decided: tuple[str, ...]
-    bound: float
-    estimate: float
-
-
 def pruning_rule(run: StudyRun, done: Sequence[TrialRecord]) -> PruningRule | None:
     """The rule that the next trials are held against; None where none is to be pruned.
 
@@ -80,34 +71,41 @@ def pruning_rule(run: StudyRun, done: Sequence[TrialRecord]) -> PruningRule | No
     return PruningRule(limit, tuple(agents[row] for row in rows), disagreement[np.ix_(rows, rows)])
 
 
-def run_or_prune(run: StudyRun, trials: Sequence[TrialRecord], rule: PruningRule, what: str) -> list[Pruned | None]:
-    """Simulate what is missing of the trials until each is through or pruned.
+Plan = tuple[TrialRecord, list[Episode]]
+"""A trial with its episodes, agents in the rule's order."""
+
+
+def run_or_prune(
+    run: StudyRun, trials: Sequence[TrialRecord], rule: PruningRule, what: str
+) -> list[TrialRecord | None]:
+    """Simulate what is missing of the trials until each is through or pruned, and give those that were pruned.
 
     Episodes that other processes have begun by then are kept in the store, but no trial stands on them.
     """
     study, place = run.study, {agent: number for number, agent in enumerate(rule.order)}
-    plans = [
-        sorted(plan_episodes(study.settings, trial.theta, study.settings.seed), key=lambda one: place[one.agent])
-        for trial in trials
-    ]
-    planned, plan_of = [episode for one in plans for episode in one], {one[0].theta: one for one in plans}
+    plans: list[Plan] = []
+    for trial in trials:
+        episodes = plan_episodes(study.settings, trial.theta, study.settings.seed)
+        plans.append((trial, sorted(episodes, key=lambda one: place[one.agent])))
+    planned, plan_at = [one for _, episodes in plans for one in episodes], {plan[1][0].theta: plan for plan in plans}
     before = run.known(planned)
 
     def enough(instance: Instance, known: Mapping[Episode, Outcome]) -> bool:
         # The bound never falls, so the last of the agents decided tells for those before it.
-        count = _decided(study, rule, plan_of[instance], known)
-        return count >= 2 and _pruned_at(study, rule, plan_of[instance], known, count) is not None
+        count = _decided(study, rule, plan_at[instance], known)
+        return count >= 2 and _pruned_at(study, rule, plan_at[instance], known, count) is not None
 
     run.outcomes(planned, what, enough)
     known = run.known(planned)
-    pruned: list[Pruned | None] = []
-    for one in plans:
+    pruned: list[TrialRecord | None] = []
+    for plan in plans:
         # By the fewest agents that suffice
-        counts = range(2, _decided(study, rule, one, known) + 1)
-        found = (_pruned_at(study, rule, one, known, count) for count in counts)
-        pruned.append(next((each for each in found if each is not None), None))
+        counts = range(2, _decided(study, rule, plan, known) + 1)
+        found = (_pruned_at(study, rule, plan, known, count) for count in counts)
+        pruned.append(next(filter(None, found), None))
     run.watcher.begin(what, len(planned) - len(known))
-    vain = [e for each, one in zip(pruned, plans, strict=True) if each for e in one if e.agent not in each.decided]
+    pairs = zip(pruned, plans, strict=True)
+    vain = [one for trial, (_, episodes) in pairs if trial for one in episodes if one.agent not in trial.decided]
     run.spent += Spent(unused=sum(episode in known and episode not in before for episode in vain))
     return pruned
 
@@ -139,22 +137,28 @@ def spared(run: StudyRun, trials: Sequence[TrialRecord]) -> tuple[int, float]:
     return len(missing), sum(seconds.get((episode.agent, episode.start), 0.0) for episode in missing)
 
 
-def _decided(study: Study, rule: PruningRule, planned: Sequence[Episode], known: Mapping[Episode, Outcome]) -> int:
+def _decided(study: Study, rule: PruningRule, plan: Plan, known: Mapping[Episode, Outcome]) -> int:
     """Count the agents, in their order and without the last, that have been driven from all starts."""
-    starts, most = study.settings.starts, len(rule.order) - 1
+    starts, most, (_, planned) = study.settings.starts, len(rule.order) - 1, plan
     through = (all(e in known for e in planned[row * starts : (row + 1) * starts]) for row in range(most))
     return next((row for row, done in enumerate(through) if not done), most)
 
 
 def _pruned_at(
-    study: Study, rule: PruningRule, planned: Sequence[Episode], known: Mapping[Episode, Outcome], count: int
-) -> Pruned | None:
-    """The verdict where the first so many agents are enough to prune; else None."""
-    names = rule.order[:count]
-    worked = [known[episode] for episode in planned[: count * study.settings.starts] if known[episode].metrics]
+    study: Study, rule: PruningRule, plan: Plan, known: Mapping[Episode, Outcome], count: int
+) -> TrialRecord | None:
+    """The trial as it was stopped, where the first so many agents are enough to prune it; else None.
+
+    PRPV of the pairs decided is a bound; what is expected of all pairs is its score.
+    """
+    trial, planned = plan
+    names, driven = rule.order[:count], [known[episode] for episode in planned[: count * study.settings.starts]]
+    worked = [outcome for outcome in driven if outcome.metrics]
     if {outcome.episode.agent for outcome in worked} != set(names):
         # An agent that failed from every start leaves the trial without a score, not with a bad one.
         return None
     bound = float(disagreement_of(study, score_table(worked), names).sum())
     share = rule.disagreement[:count, :count].sum() / rule.disagreement.sum()
-    return Pruned(names, bound, float(bound / share)) if bound > rule.limit else None
+    failed, score = len(driven) - len(worked), float(bound / share)
+    ended = replace(trial, state="cut", decided=names, bound=bound, score=score, failed_episodes=failed)
+    return ended if bound > rule.limit else None

@@ -34,19 +34,12 @@ class Best:
     """The answer: the θ that fresh episodes confirm, and until then the visited one of lowest expected PRPV.
 
     It is never the trial with the lowest PRPV for that alone, which is partly luck.
-
-    Attributes:
-        trial: The trial that visited it, or its own episodes as a trial of number UNVISITED.
-        posterior_mean: PRPV that is expected there in fresh episodes.
-        posterior_deviation: Its standard deviation.
-        assessment: How useful the proxy is there in the trial's own episodes, by every measure, with noise floor and
-            chance level.
     """
 
-    trial: TrialRecord
-    posterior_mean: float
-    posterior_deviation: float
-    assessment: Assessment
+    trial: TrialRecord  # the trial that visited it, or its own episodes as a trial of number UNVISITED
+    posterior_mean: float  # PRPV that is expected there in fresh episodes
+    posterior_deviation: float  # its standard deviation
+    assessment: Assessment  # of the proxy there in the trial's own episodes, by every measure
 
     def __repr__(self) -> str:
         theta = ", ".join(f"{name}={value:.4g}" for name, value in self.trial.theta.items())
@@ -55,44 +48,24 @@ class Best:
 
 @dataclass(frozen=True, repr=False)
 class StudyResult:
-    """A study as it stands.
+    """A study as it stands."""
 
-    Attributes:
-        study: Which one.
-        trials: Its finished and failed trials, in order.
-        best: The best of them.
-        knowledge: What is known of θ, by trials, and by fresh episodes where there are any.
-        earlier: The number of trials of earlier studies that count.
-        low_fidelity: The number of trials of a cheaper proxy.
-        answers: After each trial, the visited θ of lowest expected PRPV as all trials judge it; None while none has
-            a score.
-        truth: The θ that made the target, where that is known.
-        importances: How much each parameter matters, in the order of the box.
-        confirmation: What fresh episodes say of it; None if they are off, or not all driven yet.
-        nominal: The simulator as it is; None if the family has no nominal values, or they are not driven yet.
-        preflight: What was learnt of the parameters before the first trial; None if it is off or was never run.
-        stopped: Why it runs no further; empty while it is not at its end.
-        spared: What the trials that were cut off did without: episodes, and about how many seconds of them.
-        failures: The first failed episodes, told in one line each.
-        cautions: What the target's table does not allow, and what is probably not meant, in one line each.
-    """
-
-    study: Study
-    trials: tuple[TrialRecord, ...]
-    best: Best
-    knowledge: Knowledge
-    earlier: int
-    low_fidelity: int
-    answers: tuple[TrialRecord | None, ...]
-    truth: Theta | None
-    importances: tuple[Importance, ...]
-    confirmation: Confirmation | None
-    nominal: Nominal | None
-    preflight: Preflight | None
-    stopped: str
-    spared: tuple[int, float]
-    failures: tuple[str, ...]
-    cautions: tuple[str, ...]
+    study: Study  # which one
+    trials: tuple[TrialRecord, ...]  # its finished and failed trials, in order
+    best: Best  # the best of them
+    knowledge: Knowledge  # what is known of θ, by trials, and by fresh episodes where there are any
+    earlier: int  # the number of trials of earlier studies that count
+    low_fidelity: int  # the number of trials of a cheaper proxy
+    answers: tuple[TrialRecord | None, ...]  # after each trial, the visited θ of lowest expected PRPV, if any has
+    truth: Theta | None  # the θ that made the target, where that is known
+    importances: tuple[Importance, ...]  # how much each parameter matters, in the order of the box
+    confirmation: Confirmation | None  # what fresh episodes say of it; None if they are off, or not all driven yet
+    nominal: Nominal | None  # the simulator as it is; None without nominal values, or before they are driven
+    preflight: Preflight | None  # what was learnt before the first trial; None if it is off or was never run
+    stopped: str  # why it runs no further; empty while it is not at its end
+    spared: tuple[int, float]  # what trials that were cut off did without: episodes, and about their seconds
+    failures: tuple[str, ...]  # the first failed episodes, told in one line each
+    cautions: tuple[str, ...]  # what the target's table does not allow, and what is probably not meant: a line each
 
     def __repr__(self) -> str:
         return f"StudyResult of '{self.study.settings.name}': {len(self.trials)} trials; {self.best!r}"
@@ -186,6 +159,7 @@ def result_of(run: StudyRun, scored_anew: Sequence[TrialRecord] | None = None) -
     else:
         answer = answers[-1] if answers and answers[-1] else record(0, run.evaluation_of(finalists(trials, learnt)[0]))
     values = learnt.space.values(answer.theta)
+    told = (*study.cautions, _misfit_caution(learnt), noise_of(run).caution, *apart_notes(run.store), _overran(run))
     _, deviation = learnt.scores([values])
     proxy = run.evaluation_of(answer).proxy
     assert proxy is not None
@@ -208,18 +182,7 @@ def result_of(run: StudyRun, scored_anew: Sequence[TrialRecord] | None = None) -
         stopped=stopped(run, trials),
         spared=spared(run, trials),
         failures=_failures(run, trials),
-        cautions=tuple(
-            line
-            for line in (
-                *study.cautions,
-                _misfit_caution(learnt),
-                noise_of(run).caution,
-                *apart_notes(run.store),
-                _overran(run),
-                *best.assessment.cautions,
-            )
-            if line
-        ),
+        cautions=tuple(filter(None, (*told, *best.assessment.cautions))),
     )
 
 

@@ -51,19 +51,12 @@ class Robot:
 
 @dataclass(frozen=True, eq=False)
 class Fleet:
-    """A fleet as its scores have it; what is told by name is in the parameters' own units.
+    """A fleet as its scores have it; what is told by name is in the parameters' own units."""
 
-    Attributes:
-        settings: Of the study that knows the trials.
-        robots: In the order in which they were given.
-        population: p(θ) over those that fit; None where fewer than two do, and then nothing is told of it.
-        units: The parameters' units by their names; "" where one has none.
-    """
-
-    settings: StudySettings
-    robots: tuple[Robot, ...]
-    population: Population | None
-    units: Mapping[str, str]
+    settings: StudySettings  # of the study that knows the trials
+    robots: tuple[Robot, ...]  # in the order in which they were given
+    population: Population | None  # p(θ) over those that fit; None where these are fewer than two
+    units: Mapping[str, str]  # the parameters' units by their names; "" where one has none
 
     @property
     def fitting(self) -> tuple[Robot, ...]:

@@ -8,7 +8,7 @@ until a trial is pruned (pruning.py), and come to PRPV in `evaluate_outcomes`. A
 """
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from proxytune import search
 from proxytune.errors import RunError
@@ -18,7 +18,7 @@ from proxytune.study.earlier import earlier_trials, known_trials
 from proxytune.study.facts import check_facts
 from proxytune.study.opening import Objective
 from proxytune.study.preflight import check_some_work, noise_of
-from proxytune.study.pruning import Pruned, pruning_rule, run_or_prune
+from proxytune.study.pruning import pruning_rule, run_or_prune
 from proxytune.study.settings import StopRules
 from proxytune.study.study_run import Evaluation, StudyRun, compose_of, plan_episodes, score_trials
 
@@ -112,18 +112,15 @@ class StudyTrials:
         run, trials = self._run, self._open(batch, propose)
         first, last, budget = trials[0].number, trials[-1].number, run.settings.budget
         what = f"trial {first} of {budget}" if first == last else f"trials {first} to {last} of {budget}"
-        rule = pruning_rule(run, self._done[: batch.start])
-        if rule is None:
+        pruned: Sequence[TrialRecord | None] = [None] * len(trials)
+        if rule := pruning_rule(run, self._done[: batch.start]):
+            pruned = run_or_prune(run, trials, rule, what)
+        else:
             outcomes = run.outcomes([one for trial in trials for one in run.episodes_of(trial)], what)
             if not self._done:
                 check_some_work(outcomes.values(), what)
-            ended = [record(trial.number, run.evaluation_of(trial)) for trial in trials]
-        else:
-            pruned = run_or_prune(run, trials, rule, what)
-            ended = [
-                record(trial.number, run.evaluation_of(trial)) if one is None else record_pruned(run, trial, one)
-                for trial, one in zip(trials, pruned, strict=True)
-            ]
+        pairs = zip(trials, pruned, strict=True)
+        ended = [one or record(trial.number, run.evaluation_of(trial)) for trial, one in pairs]
         run.save_trials(*ended)
         self._done += ended
         self._tell(ended)
@@ -164,13 +161,6 @@ def record(number: int, evaluation: Evaluation) -> TrialRecord:
     return TrialRecord(number, evaluation.theta, state, score, measures, failed, evaluation.failure)
 
 
-def record_pruned(run: StudyRun, trial: TrialRecord, pruned: Pruned) -> TrialRecord:
-    """A pruned trial as the store keeps it, from the episodes of the agents decided before."""
-    ended = replace(trial, state="cut", decided=pruned.decided, bound=pruned.bound, score=pruned.estimate)
-    outcomes = run.known(run.episodes_of(ended)).values()
-    return replace(ended, failed_episodes=sum(outcome.metrics is None for outcome in outcomes))
-
-
 def stopped(run: StudyRun, done: Sequence[TrialRecord]) -> str:
     """The reason why a study with these finished trials runs no further, in one phrase; empty while it goes on.
 
@@ -205,9 +195,8 @@ def out_of_time(seconds: float, rules: StopRules) -> str:
     """The phrase where so many seconds are more than the rules allow; empty where they are not."""
     if rules.wall_time_s is None or seconds < rules.wall_time_s:
         return ""
-    return (
-        f"episodes took {seconds:.3g} s and stop.wall_time_s is {rules.wall_time_s:g}; raise or remove it to continue"
-    )
+    told = f"episodes took {seconds:.3g} s and stop.wall_time_s is {rules.wall_time_s:g}"
+    return f"{told}; raise or remove it to continue"
 
 
 def nothing_to_gain(label: str, gain_and_noise: tuple[float, float], rules: StopRules) -> str:
@@ -215,10 +204,8 @@ def nothing_to_gain(label: str, gain_and_noise: tuple[float, float], rules: Stop
     gain, noise = gain_and_noise
     if rules.no_improvement is None or gain >= rules.no_improvement * noise:
         return ""
-    return (
-        f"no θ is expected to improve {label} by more than {gain:.2g}; its noise is {noise:.2g} and"
-        f" stop.no_improvement is {rules.no_improvement:g}; lower or remove it to continue"
-    )
+    remedy = f"stop.no_improvement is {rules.no_improvement:g}; lower or remove it to continue"
+    return f"no θ is expected to improve {label} by more than {gain:.2g}; its noise is {noise:.2g} and {remedy}"
 
 
 def _gain(run: StudyRun, done: Sequence[TrialRecord]) -> tuple[float, float]:

@@ -95,10 +95,8 @@ def unnoticed(folder: Path) -> tuple[str, ...]:
     if not names or not any(is_module(path) for path in files):
         return ()
     more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
-    return (
-        f"{', '.join(names[:NAMED])}{more}: if agents read this, a change in it is not noticed; "
-        "give agents whose weights change another name",
-    )
+    remedy = "give agents whose weights change another name"
+    return (f"{', '.join(names[:NAMED])}{more}: if agents read this, a change in it is not noticed; {remedy}",)
 
 
 FAMILY_KEYS = ("family", "proxy", "domain", "parameters")
@@ -159,81 +157,43 @@ KEYS = (
 
 @dataclass(frozen=True)
 class StudySettings:
-    """A study.toml.
+    """A study.toml."""
 
-    Attributes:
-        path: The file.
-        name: What the study is called.
-        family: Where the domain family comes from, as "module:factory".
-        proxy: A model.toml whose effects the proxy has, if any.
-        truth: A model.toml of what made the target, where that is known.
-        objective: The measure that is made small or large: "prpv", "ppv", "plv", or one's own.
-        metrics: How agents are compared.
-        agents: Names of the agents, at least two, as tables and figures have them.
-        starts: How many of the family's starting conditions, the first ones, each agent drives from.
-        budget: How many trials.
-        initial: How many of them come from the quasi-random design.
-        batch: How many trials are proposed together, and their episodes run together.
-        engine: Name of what proposes the others.
-        seed: Seed of the episodes and of the search.
-        jobs: How many processes run episodes.
-        stop_on_failure: Whether a failing episode stops the study.
-        preflight: Whether each parameter is first shown to matter.
-        confirm: How often the best θ are driven again in fresh episodes when the search has ended.
-        cut_off: Whether a trial ends once it cannot be among the best any more.
-        stop: When it ends before its budget is spent.
-        space: The search box, its parameters sorted by name.
-        domain: The table that the family's factory reads.
-        teaching: How a proxy's worth as a teacher is measured, if it is.
-        aliases: What is loaded for an agent whose name in tables is another.
-        targets: The files that hold the target's scores; none of a bank, which simulates for other studies.
-        learn_from: Studies and tables of trials whose trials are known before the first one, as study.toml has them.
-        low_fidelity: Such of a cheaper proxy, whose outputs this one's are modelled by their difference to.
-        target_columns: What columns are called in the target's files where that is another name.
-        episode_timeout_s: How long an episode may take before it counts as failed [s], if that is limited.
-        families: The same study of each of several domain families, by their names; empty of a study of one.
-        family_name: Which of several it is of; empty if there is but one.
-    """
-
-    path: Path
-    name: str
-    family: str
-    proxy: Path | None
-    truth: Path | None
-    objective: str
-    metrics: tuple[Metric, ...]
-    agents: tuple[str, ...]
-    starts: int
-    budget: int
-    initial: int
-    batch: int
-    engine: str
-    seed: int
-    jobs: int
-    stop_on_failure: bool
-    preflight: bool
-    confirm: int
-    cut_off: bool
-    stop: StopRules
-    space: Space
-    domain: Section
-    teaching: TeachingSettings | None = None
-    aliases: Mapping[str, str] = field(default_factory=dict)
-    targets: tuple[Path, ...] = ()
-    learn_from: tuple[str, ...] = ()
-    low_fidelity: tuple[str, ...] = ()
-    target_columns: Mapping[str, str] = field(default_factory=dict)
-    episode_timeout_s: float | None = None
-    families: Mapping[str, "StudySettings"] = field(default_factory=dict)
-    family_name: str = ""
+    path: Path  # the file
+    name: str  # what the study is called
+    family: str  # where the domain family comes from, as "module:factory"
+    proxy: Path | None  # a model.toml whose effects the proxy has, if any
+    truth: Path | None  # a model.toml of what made the target, where that is known
+    objective: str  # the measure that is made small or large: "prpv", "ppv", "plv", or one's own
+    metrics: tuple[Metric, ...]  # how agents are compared
+    agents: tuple[str, ...]  # names of the agents, at least two, as tables and figures have them
+    starts: int  # how many of the family's starting conditions, the first ones, each agent drives from
+    budget: int  # how many trials
+    initial: int  # how many of them come from the quasi-random design
+    batch: int  # how many trials are proposed together, and their episodes run together
+    engine: str  # name of what proposes the others
+    seed: int  # seed of the episodes and of the search
+    jobs: int  # how many processes run episodes
+    stop_on_failure: bool  # whether a failing episode stops the study
+    preflight: bool  # whether each parameter is first shown to matter
+    confirm: int  # how often the best θ are driven again in fresh episodes when the search has ended
+    cut_off: bool  # whether a trial ends once it cannot be among the best any more
+    stop: StopRules  # when it ends before its budget is spent
+    space: Space  # the search box, its parameters sorted by name
+    domain: Section  # the table that the family's factory reads
+    teaching: TeachingSettings | None = None  # how a proxy's worth as a teacher is measured, if it is
+    aliases: Mapping[str, str] = field(default_factory=dict)  # what is loaded for agents of another name
+    targets: tuple[Path, ...] = ()  # files of the target's scores; none of a bank, which simulates for others
+    learn_from: tuple[str, ...] = ()  # where trials are known from before the first, as study.toml has it
+    low_fidelity: tuple[str, ...] = ()  # such of a cheaper proxy, to whose outputs differences are modelled
+    target_columns: Mapping[str, str] = field(default_factory=dict)  # other names of columns in the target's files
+    episode_timeout_s: float | None = None  # how long an episode may take before it counts as failed [s], if limited
+    families: Mapping[str, "StudySettings"] = field(default_factory=dict)  # the same study by each of its families
+    family_name: str = ""  # which of several it is of; empty if there is but one
 
     @property
     def target(self) -> Path:
-        """The score table of the target; of several files the first.
-
-        Raises:
-            SettingsError: If there is none.
-        """
+        """The score table of the target; of several files the first; refused if there is none."""
         if not self.targets:
             told = "is missing, so this is a bank, which `study` runs and learn_from names; name a table of scores"
             raise self.error("target", told)
@@ -266,11 +226,7 @@ class StudySettings:
         return Section(self.path, where, {}).error(key, problem)
 
     def check_single(self) -> None:
-        """Refuse a study of several families where one is needed.
-
-        Raises:
-            SettingsError: That says how to name one of them.
-        """
+        """Refuse a study of several families where one is needed, and say how to name one of them."""
         if self.families:
             one = self.home / FAMILIES / next(iter(self.families))
             raise self.error(FAMILIES, f"each of these is a study of its own, and one is needed; give one, as {one}")

@@ -22,20 +22,15 @@ Columns = Mapping[str, NDArray[np.float64]]
 
 @dataclass(frozen=True, eq=False)
 class RecordedEpisode:
-    """What became of one episode.
+    """What became of one episode."""
 
-    Attributes:
-        metrics: Its scores, by name.
-        poses: Columns by name: `time` [s] and, of a robot on a floor, x, y [m] and heading [rad]; none where the family
-            keeps no poses.
-        commands: Columns by name: `time` [s] and a channel each; none likewise.
-        pictures: What the camera saw before each command, (commands, rows, columns, 3); None where nobody asked for
-            pictures, or the family cannot give them.
-    """
-
-    metrics: Mapping[str, float]
+    metrics: Mapping[str, float]  # its scores, by name
+    # columns by name: `time` [s] and, of a robot on a floor, x, y [m] and heading [rad]; none where the family keeps no
+    # poses
     poses: Columns
-    commands: Columns
+    commands: Columns  # columns by name: `time` [s] and a channel each; none likewise
+    # what the camera saw before each command, (commands, rows, columns, 3); None where nobody asked for pictures, or
+    # the family cannot give them
     pictures: NDArray[np.uint8] | None = None
 
     @property
@@ -140,23 +135,14 @@ APART_M = 0.05
 
 @dataclass(frozen=True, eq=False)
 class SideBySide:
-    """An episode in the proxy and, where there is one to drive in, in the target.
+    """An episode in the proxy and, where there is one to drive in, in the target."""
 
-    Attributes:
-        episode: Which one; its θ is the proxy's.
-        units: The family's metrics with their units.
-        command_unit: What commands are given in, empty where that is not known.
-        road: The map to draw ways on, where the family has one (`domain.Recorder`).
-        proxy: What became of it in the proxy.
-        target: What became of it in the target, None if there is none.
-    """
-
-    episode: Episode
-    units: Mapping[str, str]
-    command_unit: str
-    road: Any
-    proxy: RecordedEpisode
-    target: RecordedEpisode | None
+    episode: Episode  # which one; its θ is the proxy's
+    units: Mapping[str, str]  # the family's metrics with their units
+    command_unit: str  # what commands are given in, empty where that is not known
+    road: Any  # the map to draw ways on, where the family has one (`domain.Recorder`)
+    proxy: RecordedEpisode  # what became of it in the proxy
+    target: RecordedEpisode | None  # what became of it in the target, None if there is none
 
     @property
     def sides(self) -> dict[str, RecordedEpisode]:
@@ -200,6 +186,5 @@ def check_robot(family: DomainFamily, model: Path, option: str) -> None:
     robot = getattr(family, "robot", None)
     stated = read_settings(model).values.get("robot", robot)
     if robot is not None and stated != robot:
-        raise InputError(
-            f"{option} {model}: is of the robot '{stated}'; give a model of '{robot}', which the study drives"
-        )
+        other = f"is of the robot '{stated}'; give a model of '{robot}', which the study drives"
+        raise InputError(f"{option} {model}: {other}")

@@ -34,25 +34,17 @@ from proxytune.usefulness import dominance
 
 @dataclass(frozen=True)
 class Evaluation:
-    """The usefulness of a domain instance.
+    """The usefulness of a domain instance."""
 
-    Attributes:
-        theta: The instance.
-        proxy: The agents' scores in it, over the episodes that worked; None if an agent has none.
-        measures: Every measure by name, the objective's among them; one that is undefined is None. Empty if an agent
-            has no episode that worked.
-        score: What the study makes small; None if there is none.
-        failures: The outcomes that failed.
-        failure: Why there is no score, empty if there is one.
-        disagreement: |α_proxy − α_target| of each pair of agents, in the order of their names, shape (agents, agents).
-    """
-
-    theta: Theta
-    proxy: ScoreTable | None
+    theta: Theta  # the instance
+    proxy: ScoreTable | None  # the agents' scores in it, over the episodes that worked; None if an agent has none
+    # every measure by name, the objective's among them; one that is undefined is None; empty if an agent has no episode
+    # that worked
     measures: Mapping[str, float | None]
-    score: float | None
-    failures: tuple[Outcome, ...]
-    failure: str = ""
+    score: float | None  # what the study makes small; None if there is none
+    failures: tuple[Outcome, ...]  # the outcomes that failed
+    failure: str = ""  # why there is no score, empty if there is one
+    # |α_proxy − α_target| of each pair of agents, in the order of their names, shape (agents, agents)
     disagreement: Floats | None = field(default=None, compare=False, repr=False)
 
     @property
@@ -187,11 +179,7 @@ Enough = Callable[[Instance, Mapping[Episode, Outcome]], bool]
 class StudyRun:
     """A study with its store: asked for outcomes or an evaluation, it simulates what is missing and returns them.
 
-    Attributes:
-        study: The study.
-        store: Where every finished episode is kept, at once.
-        watcher: Hears of every episode.
-        spent: What this run has cost so far.
+    Every finished episode is kept in the store at once, its watcher hears of it, and `spent` is what all has cost.
     """
 
     def __init__(self, study: Study, store: Store, watcher: Watcher | None = None) -> None:
@@ -236,10 +224,8 @@ class StudyRun:
         A failed episode counts as known where failures do not stop the study and the code that failed is still the
         same; else it is tried again, since something is expected to have been corrected. So is, once, one that an
         earlier run gave too little time. Where it is asked whether what is known of a domain instance is enough, agents
-        begin in their order, each in all instances, and none more begins in an instance after a yes.
-
-        Raises:
-            EpisodeError: If an episode fails and the study is to stop then.
+        begin in their order, each in all instances, and none more begins in an instance after a yes. An EpisodeError is
+        raised if one fails and the study is to stop then.
         """
         again = self.settings.stop_on_failure
         known = {e: o for e, o in self.known(planned).items() if not (o.failure and (again or e in self.corrected))}
@@ -300,7 +286,7 @@ class StudyRun:
             apart = kept_apart(store, self.settings, self.study.family, self.study.code, needed, watch)
             yield replace(watch, alone=apart | store.agents_that_failed(RAISED))
         finally:
-            store.end_episodes()
+            store.begin_episode(identity)
 
     def _keep(self, outcomes: Sequence[Outcome]) -> None:
         """Keep the outcomes of a fleet; what took too long for the first time is tried again by the next run."""
@@ -317,11 +303,7 @@ class StudyRun:
             raise EpisodeError(f"{failure_of(failed[0])}; correct it and run again, or set on_failure = 'continue'")
 
     def evaluate(self, theta: Theta, what: str) -> Evaluation:
-        """Score a domain instance by every agent from every start.
-
-        Raises:
-            EpisodeError: If an episode fails and the study is to stop then.
-        """
+        """Score a domain instance by every agent from every start, unless one fails and the study is to stop then."""
         self.outcomes(plan_episodes(self.settings, theta, self.settings.seed), what)
         evaluation = self.evaluation(theta)
         assert evaluation is not None
@@ -339,15 +321,10 @@ class StudyRun:
         return self._evaluations[key]
 
     def evaluation_of(self, trial: TrialRecord) -> Evaluation:
-        """The score of a finished trial.
-
-        Raises:
-            RunError: If the store lacks some of its episodes.
-        """
-        evaluation = self.evaluation(trial.theta)
-        if evaluation is None:
-            raise self._lacks_episodes(trial)
-        return evaluation
+        """The score of a finished trial; refused if the store lacks some of its episodes."""
+        if evaluation := self.evaluation(trial.theta):
+            return evaluation
+        raise self._lacks_episodes(trial)
 
     def episodes_of(self, trial: TrialRecord) -> list[Episode]:
         """The episodes that a trial stands on: all, or those of the agents decided before it was pruned."""
@@ -370,10 +347,7 @@ class StudyRun:
     def search_trial(self, trial: TrialRecord) -> Trial:
         """A finished trial as the search sees it; of one that was pruned, the outputs of the agents driven until then.
 
-        Of these the store may happen to have more: other processes had begun them.
-
-        Raises:
-            RunError: If the store lacks episodes of it.
+        Of these the store may happen to have more: other processes had begun them. Refused if it lacks any.
         """
         if trial.number not in self._trials:
             planned = self.episodes_of(trial)
@@ -405,9 +379,8 @@ def with_spending(study: Study, *, budget: int | None = None, jobs: int | None =
             raise InputError(f"{name} must be between {least} and {most}, got {value}")
     settings = study.settings
     if budget is not None and settings.objective == LEARNING:
-        raise settings.error(
-            "budget", f"a search for '{LEARNING}' has its own; set teaching.budget in this file instead"
-        )
+        told = f"a search for '{LEARNING}' has its own; set teaching.budget in this file instead"
+        raise settings.error("budget", told)
     spending = replace(settings, budget=settings.budget if budget is None else budget, jobs=jobs or settings.jobs)
     return replace(study, settings=spending)
 

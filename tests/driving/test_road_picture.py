@@ -12,7 +12,7 @@ from hypothesis import given, settings, strategies as st
 
 from proxytune.driving import COLOURS, LINES, Markings, draw_floor, lane_length, lane_point, shipped_map
 from proxytune.driving.road import Arc, Straight
-from proxytune.driving.road_picture import MARGIN, _shapes, painted
+from proxytune.driving.road_picture import MARGIN, painted
 
 ROADS = {name: shipped_map(name) for name in ("small_loop", "horseshoe")}
 MARKINGS = {name: Markings(road) for name, road in ROADS.items()}
@@ -75,7 +75,7 @@ def tolerance(here):
 def test_distances_are_those_that_the_floor_is_painted_with(name, seed):
     road = ROADS[name]
     places = np.random.default_rng(seed).uniform(-0.1, 1.1, (300, 2)) * road.size
-    shapes = _shapes(road, painted(road), places)
+    shapes = MARKINGS[name].shapes(places)
     for colour in MARKINGS_COLOURS:
         np.testing.assert_allclose(marks(name, colour, places).distance, shapes[colour], atol=1e-9)
 

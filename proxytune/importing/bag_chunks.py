@@ -10,10 +10,10 @@ import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from pathlib import Path
-from typing import IO, Any, NamedTuple, cast
+from typing import IO, Any, NamedTuple
 
 from proxytune.settings import allowed_bytes
-from proxytune.unpacking import BAG_MB, Decompressor, check_unpacked, unpacked_size
+from proxytune.unpacking import BAG_MB, check_unpacked, unpacked_size
 
 DENSEST = 100
 """Times its own size: pictures of a world that stands still pack so well, and hardly anything else."""
@@ -61,13 +61,14 @@ def _check(path: Path, chunks: Iterable[Chunk]) -> None:
             check_unpacked(path, size, most / 1e6)
 
 
-def _decompressor(packing: str) -> Callable[[], Decompressor]:
+def _decompressor(packing: str) -> Callable[[], Any]:
     if packing == "bz2":
         return bz2.BZ2Decompressor
     if packing == "lz4":
         from lz4.frame import LZ4FrameDecompressor
 
-        return cast(Callable[[], Decompressor], LZ4FrameDecompressor)
+        made: Callable[[], Any] = LZ4FrameDecompressor
+        return made
     if sys.version_info >= (3, 14):
         from compression.zstd import ZstdDecompressor
     else:

@@ -27,20 +27,12 @@ class Chunk(NamedTuple):
 
 
 def check_bag_size(path: Path) -> None:
-    """Refuse a bag whose files unpack to more than is allowed; what is damaged is left to whoever reads it.
-
-    Raises:
-        InputError: With what raises the limit.
-    """
+    """Refuse a bag whose files unpack to more than is allowed; what is damaged is left to whoever reads it."""
     _check(path, (chunk for file in _files(path) for chunk in _chunks(file)))
 
 
 def check_messages_size(path: Path, reader: Any) -> None:
-    """Refuse a bag whose messages, each packed by itself, unpack to more; the library's reader of it is open.
-
-    Raises:
-        InputError: With what raises the limit.
-    """
+    """Refuse a bag whose messages, each packed by itself, unpack to more; the library's reader of it is open."""
     inside: list[Any] = [getattr(one, "storage", None) for one in reader.readers]
     folders = [one for one in inside if hasattr(one, "storages")]
     packed = [folder for folder in folders if folder.metadata.compression_mode == "message"]

@@ -109,11 +109,7 @@ Cell = str | float | None
 
 
 def check_table_file(option: str, path: Path) -> None:
-    """Refuse a file of another kind before anything is worked out.
-
-    Raises:
-        InputError: If its name ends otherwise.
-    """
+    """Refuse a file of another kind before anything is worked out."""
     if path.suffix not in ENDINGS:
         raise InputError(f"{option} {path}: a table is written as {' or '.join(ENDINGS)}; name the file so")
 

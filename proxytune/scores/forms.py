@@ -232,11 +232,7 @@ def expand(metrics: Sequence[str], header: Sequence[str]) -> list[str]:
 
 
 def check_sides(where: str, header: Sequence[str], metrics: Sequence[str]) -> None:
-    """Refuse to compare a column of a table with itself.
-
-    Raises:
-        ScoresError: If both sides would take the same column.
-    """
+    """Refuse to compare a column of a table with itself."""
     for name in metrics:
         own = {own_column(name, header, side) for side in ("proxy", "target")}
         if len(own) == 1 and None not in own:

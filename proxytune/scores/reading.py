@@ -189,11 +189,7 @@ def _number(text: str) -> float:
 
 
 def column_names(path: Path, part: str | None = None) -> list[str]:
-    """The columns of a file, as its first line names them.
-
-    Raises:
-        ScoresError: If it cannot be read.
-    """
+    """The columns of a file, as its first line names them."""
     if forms.is_form(path):
         return forms.form_rows(path, part)[0]
     text = _text(path)
@@ -336,11 +332,7 @@ def read_domains(
     side: forms.Side | None = None,
     part: str | None = None,
 ) -> dict[str, ScoreTable]:
-    """Read every domain of a CSV file or of several, in their order; without a domain column the only one is "".
-
-    Raises:
-        ScoresError: As in read_scores.
-    """
+    """Read every domain of a CSV file or of several, in their order; without a domain column the only one is ""."""
     names = tuple(metrics)
     files = [read_cells(file, names, columns, side, part) for file in _files(path)]
     for label, cells in [(label, cells) for label in forms.LABELS for cells in files]:
@@ -397,11 +389,7 @@ def _check_single(files: Sequence[Cells], rows: Sequence[Row]) -> None:
 
 
 def write_scores(table: ScoreTable, path: Path) -> None:
-    """Write a table as CSV, the same bytes for the same table; an interrupted write leaves the old file.
-
-    Raises:
-        ScoresError: If the file cannot be written.
-    """
+    """Write a table as CSV, the same bytes for the same table; an interrupted write leaves the old file."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(["agent", "episode", *table.metrics])

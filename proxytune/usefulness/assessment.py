@@ -257,11 +257,7 @@ def assess_each(
     resamples: int = 1000,
     seed: int = 0,
 ) -> tuple[dict[str, Assessment], Selection | None]:
-    """Assess proxies of one target by name, and rank them where there are several.
-
-    Raises:
-        ScoresError, InputError: As in assess.
-    """
+    """Assess proxies of one target by name, and rank them where there are several."""
     found = {
         name: assess(proxy=one, target=target, metrics=metrics, beta=beta, asked=asked, resamples=resamples, seed=seed)
         for name, one in proxies.items()
@@ -292,9 +288,6 @@ def select_proxy(
 
     All proxies meet the same resampled target. The intervals are simultaneous: their width is set by the largest
     studentised deviation among all differences, so that looking at many pairs makes no false find more likely.
-
-    Raises:
-        ScoresError: If there is no proxy, or as in prpv.
     """
     if not proxies:
         raise ScoresError("no proxy is given; name at least one")

@@ -159,9 +159,6 @@ def decide(inputs: Comparison, asked: Asked, saving: Saving | None = None, seed:
     """Say which agent to deploy.
 
     What the proxy adds to the target's means where starts are paired (`saving`) counts where that is beyond noise.
-
-    Raises:
-        InputError: If the metric to choose by is not there.
     """
     columns, chosen_on = chosen(inputs, asked.decide_on)
     signs = np.array([1.0 if inputs.metrics[column].direction == "max" else -1.0 for column in columns])

@@ -24,9 +24,6 @@ def ros_text(instance: Instance) -> str:
     """A parameter file for the robot's own controller: with it the robot goes as it is told.
 
     The multipliers are those of open-loop driving: a wheel that turns slower than told is treated as a smaller one.
-
-    Raises:
-        InputError: If the robot lacks a figure.
     """
     lines = [f"# {line}" for line in header(instance, "ros")] + _controller(instance)
     if (camera := instance.camera) is not None:

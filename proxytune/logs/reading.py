@@ -126,7 +126,7 @@ def read_log(path: str | Path) -> Log:
 
 
 def read_commands(path: Path) -> tuple[str, dict[str, tuple[Floats, Floats]]]:
-    """Read a table as a log's commands.csv: its kind, by its columns, and episodes' times (M,) [s] and commands (M, 2)."""
+    """Read a table as a log's commands.csv: its kind, by its columns; episodes' times (M,) [s] and commands (M, 2)."""
     header, _ = read_cells(path)
     kind = next((kind for kind, columns in COMMANDS.items() if columns and {*columns} <= {*header}), "")
     if not kind:

@@ -227,17 +227,23 @@ NO_FACTS = Facts()
 
 
 @contextmanager
-def open_log(path: Path, wanted: Wanted = NOTHING, facts: Facts = NO_FACTS) -> Iterator[tuple[Log, tuple[str, ...]]]:
-    """A log's folder, or a bag or table as the log that `import` would make of it, and what was found on the way.
+def open_log(
+    source: Log | str | Path, wanted: Wanted = NOTHING, facts: Facts = NO_FACTS
+) -> Iterator[tuple[Log, tuple[str, ...]]]:
+    """A log itself, its folder, or a bag or table as the log that `import` makes of it, and what was found on the way.
 
     What is imported lies in a temporary folder for as long as the log is open.
     """
+    if isinstance(source, Log):
+        yield source, ()
+        return
+    path = Path(source)
     if (path / "log.toml").is_file() or (path / "samples.csv").is_file():
         yield read_log(path), ()
         return
-    source = read_source(path, wanted, facts.offset_s)
-    with as_log(with_named_pictures(source, facts), facts, path) as log:
-        yield log, source.notes
+    found = read_source(path, wanted, facts.offset_s)
+    with as_log(with_named_pictures(found, facts), facts, path) as log:
+        yield log, found.notes
 
 
 @contextmanager

@@ -116,7 +116,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     typed = names_in(getattr(arguments, "effects", ""))
     with nullcontext() if command.runs_code else running_none(arguments.command, typed):
         return run_command(
-            lambda: command.load().run(arguments),
+            lambda: command.load()(arguments),
             arguments,
             program=f"proxytune {arguments.command}",
             left=command.left,

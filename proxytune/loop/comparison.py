@@ -190,9 +190,7 @@ def floor_text(level: Level | None, unit: str) -> str:
     if level.floor is None and level.floor_ends:
         return f"{report.short_span(*level.floor_ends)}{unit and ' '}{unit}"
     assert level.floor is not None
-    if level.chance is not None and level.floor_ends:
-        return report.in_pairs(level.floor, *level.floor_ends)
-    return report.with_span(f"{report.short(level.floor)}{unit and ' '}{unit}", *(level.floor_ends or (None, None)))
+    return level_text(Level(level.floor, level.floor_ends, chance=level.chance), unit)
 
 
 def _change(row: Compared) -> str:

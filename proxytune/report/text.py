@@ -2,6 +2,7 @@
 
 import csv
 import io
+import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -81,30 +82,9 @@ def group_texts(*parts: RenderableType) -> Group:
 
 
 ENDINGS = (".csv", ".tex")
-GREEK = ("alpha", "beta", "delta", "theta", "lambda", "mu", "rho", "sigma", "tau", "varphi", "omega", "Theta")
-IN_LATEX = {
-    "\\": r"\textbackslash{}",
-    **{character: f"\\{character}" for character in "&%$#_{}"},
-    "~": r"\textasciitilde{}",
-    "^": r"\textasciicircum{}",
-    "<": "$<$",
-    ">": "$>$",
-    "−": "$-$",
-    "–": "--",
-    "…": r"\ldots{}",
-    "’": "'",
-    "°": r"$^\circ$",
-    "²": "$^2$",
-    "±": r"$\pm$",
-    "×": r"$\times$",
-    "·": r"$\cdot$",
-    "≤": r"$\leq$",
-    "≥": r"$\geq$",
-    "→": r"$\rightarrow$",
-    "∞": r"$\infty$",
-    **{letter: f"$\\{name}$" for letter, name in zip("αβδθλμρστφωΘ", GREEK, strict=True)},
-}
-"""Characters that pdflatex would take for a command, or has no glyph for; accented letters it reads as they are."""
+IN_LATEX: dict[str, str] = tomllib.loads(
+    (Path(__file__).parent / "templates" / "latex.toml").read_text(encoding="utf-8")
+)
 Cell = str | float | None
 
 

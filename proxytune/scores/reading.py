@@ -103,7 +103,7 @@ def read_cells(
     if len(bare) == len(whose):
         header = [bare.get(name, name) for name in header]
     _check_header(path, header, metrics)
-    more = {name: forms.beside(name, name, header, side) for name in metrics}
+    more = {name: forms.beside(name, header, side) for name in metrics}
     wanted = {*forms.LABELS, *metrics, *(column for pair in more.values() for column in pair if column is not None)}
     lines, cells = _columns(path, rows, header, wanted)
     if forms.is_form(path):  # an agent that a dictionary does not have is left out
@@ -371,8 +371,6 @@ def _files(path: Files) -> list[Path]:
 
 def _check_single(files: Sequence[Cells], rows: Sequence[Row]) -> None:
     """Refuse an episode that one agent drove twice in one domain."""
-    if len(set(rows)) == len(rows):
-        return
     known: dict[Row, Path] = {}
     places = ((cells, line) for cells in files for line in cells.lines)
     for (cells, line), row in zip(places, rows, strict=True):

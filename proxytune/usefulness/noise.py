@@ -99,13 +99,10 @@ def floor_of_repeats(
     one, other = (table.arrange(agents=inputs.agents, episodes=shared) for table in (one, other))
     both = (one.driven & other.driven)[..., None]
     one, other = (replace(table, values=np.where(both, table.values, np.nan)) for table in (one, other))
-    absent = [agent for agent, count in zip(one.agents, one.counts, strict=True) if not count]
-    reason = (
-        f"agent '{absent[0]}' drove no start both times"
-        if absent
-        else resampling.too_few(one, "from starts driven both times")
-    )
-    if reason:
+    absent = [
+        f"agent '{agent}' drove no start both times" for agent, n in zip(one.agents, one.counts, strict=True) if not n
+    ]
+    if reason := next(iter(absent), "") or resampling.too_few(one, "from starts driven both times"):
         return NoiseFloor("none", reason=reason)
     value = float(prpv_of_means(one.means, other.means, metrics))
     counts = resampling.draw_counts(one, np.random.default_rng(seed), resamples)

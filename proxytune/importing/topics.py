@@ -3,7 +3,8 @@
 A topic is taken by its type, its name and its number of messages, unless the user names it.
 """
 
-from collections.abc import Mapping
+import tomllib
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -25,18 +26,14 @@ def short(kind: str) -> str:
 
 @dataclass(frozen=True)
 class Role:
-    """Something that a log needs of a bag, the option that names its topic, and types of message by their ranks.
-
-    Names with parts that go first are taken before others, those with parts of something else never; some types are
-    taken only where the topic is asked for by name.
-    """
+    """Something that a log needs of a bag, as roles.toml has it."""
 
     name: str
     option: str
     ranks: Mapping[str, int]
-    first: tuple[str, ...] = ()
-    never: tuple[str, ...] = ()
-    asked: tuple[str, ...] = ()
+    first: Sequence[str] = ()
+    never: Sequence[str] = ()
+    asked: Sequence[str] = ()
 
     def can_be(self, topic: Topic) -> bool:
         """True if a topic has messages that can be read as this."""
@@ -69,22 +66,8 @@ class Role:
 
 KIND_OF = {name: kind for name, (kind, _) in COMMAND_TYPES.items()} | {short(VESC): "speed_steering"}
 """The kind of command that a type of message says; empty where it says none."""
-COMMAND_ROLE = Role(
-    "commands",
-    "--commands",
-    {name: place for place, name in enumerate(KIND_OF)} | {"TwistStamped": 0, "Float64MultiArray": 3},
-    first=("cmd_vel", "cmd", "command"),
-    asked=("JointState",),
-)
-POSE_ROLE = Role(
-    "poses",
-    "--poses",
-    {"PoseStamped": 0, "TransformStamped": 0, "PoseWithCovarianceStamped": 1, "Odometry": 2}
-    | {"TFMessage": 3, "tfMessage": 3},
-    first=("mocap", "vicon", "vrpn", "optitrack", "qualisys", "ground_truth"),
-    never=("goal", "target", "setpoint", "initialpose", "cmd", "command", "tf_static"),
-)
-PICTURE_ROLE = Role("pictures", "--pictures", {"Image": 0, "CompressedImage": 1}, never=("depth", "mask", "debug"))
+ROLES = tomllib.loads(Path(__file__).with_name("roles.toml").read_text(encoding="utf-8"))
+COMMAND_ROLE, POSE_ROLE, PICTURE_ROLE = (Role(name, **table) for name, table in ROLES.items())
 
 
 @dataclass(frozen=True)

@@ -7,10 +7,11 @@ from typing import Any
 from matplotlib.figure import Figure
 from rich.console import Group
 
+from proxytune.files import csv_text
 from proxytune.report import decision
 from proxytune.report.html import write_page
 from proxytune.report.score_figures import MOST, flipped_pairs_figure, scatter_figure
-from proxytune.report.text import Cell, csv_text, group_texts, latex_text, note_texts, table_text
+from proxytune.report.text import Cell, group_texts, latex_text, note_texts, table_text
 from proxytune.report.view import Column, Foot, Paragraphs, Picture, Table, View, columns_of
 from proxytune.report.wording import listed, short, short_span, with_span
 from proxytune.report.writing import file_names, picture_of, save_figures, write_text

@@ -15,11 +15,12 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from rich.console import Group, RenderableType
 
+from proxytune.files import csv_text
 from proxytune.report import figure_style as style
 from proxytune.report.html import write_page
 from proxytune.report.scores import score_document
 from proxytune.report.study.page import study_foot
-from proxytune.report.text import Cell, csv_text, group_texts, table_text
+from proxytune.report.text import Cell, group_texts, table_text
 from proxytune.report.view import Drawn, Paragraphs, Part, Table, View, columns_of
 from proxytune.report.wording import listed, plain, short, with_unit
 from proxytune.report.writing import picture_of, write_text

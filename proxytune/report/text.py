@@ -1,7 +1,5 @@
 """Views on the terminal, tables without lines with their headings and notes; and tables as files, CSV and LaTeX."""
 
-import csv
-import io
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -92,13 +90,6 @@ def check_table_file(option: str, path: Path) -> None:
     """Refuse a file of another kind before anything is worked out."""
     if path.suffix not in ENDINGS:
         raise InputError(f"{option} {path}: a table is written as {' or '.join(ENDINGS)}; name the file so")
-
-
-def csv_text(columns: Sequence[str], rows: Sequence[Sequence[Cell]]) -> str:
-    """A table as CSV; cells without a value are empty."""
-    text = io.StringIO()
-    csv.writer(text, lineterminator="\n").writerows([columns, *rows])
-    return text.getvalue()
 
 
 def latex_text(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

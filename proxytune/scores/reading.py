@@ -16,7 +16,7 @@ import numpy as np
 
 from proxytune.arrays import Floats
 from proxytune.errors import ScoresError
-from proxytune.files import draft_of
+from proxytune.files import csv_text, draft_of
 from proxytune.scores import forms
 from proxytune.scores.table import LARGEST, ScoreTable
 from proxytune.settings import nearest, read_text
@@ -388,15 +388,10 @@ def _check_single(files: Sequence[Cells], rows: Sequence[Row]) -> None:
 
 def write_scores(table: ScoreTable, path: Path) -> None:
     """Write a table as CSV, the same bytes for the same table; an interrupted write leaves the old file."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(["agent", "episode", *table.metrics])
-    for row, agent in enumerate(table.agents):
-        for column, episode in enumerate(table.episodes):
-            if table.driven[row, column]:
-                writer.writerow([agent, episode, *(repr(float(value)) for value in table.values[row, column])])
+    driven = np.argwhere(table.driven)
+    rows = ([table.agents[row], table.episodes[at], *map(repr, table.values[row, at].tolist())] for row, at in driven)
     try:
         with draft_of(path) as draft:
-            draft.write_text(text.getvalue(), encoding="utf-8", newline="")
+            draft.write_text(csv_text(["agent", "episode", *table.metrics], rows), encoding="utf-8", newline="")
     except OSError as problem:
         raise ScoresError(f"{path}: cannot be written ({problem.strerror})") from None

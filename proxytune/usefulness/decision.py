@@ -178,14 +178,15 @@ def decide(inputs: Comparison, asked: Asked, saving: Saving | None = None, seed:
     tasks = tuple(_part(agents, parts, each, [k]) for k in places)
     rest = [(out, [k for k in places if k != out]) for out in places]
     without = tuple(replace(_part(agents, parts, each, others), name=parts[out][0]) for out, others in rest)
+    regrets = sides[1].max() - sides[1]
+    bare = Decision(
+        winner=observed.target_winners[0], probability_best=None, regret_interval=None, best_probabilities=None,
+        expected_regret=dict(zip(agents, map(float, regrets), strict=True)),
+        not_told_apart=observed.target_winners[1:], chosen_on=chosen_on, observed=observed, tasks=tasks,
+        without=without, least_told=None, basis="", scores=None, draws=None, counts=(),
+    )  # fmt: skip
     if known is None:
-        regrets = sides[1].max() - sides[1]
-        return Decision(
-            winner=observed.target_winners[0], probability_best=None, regret_interval=None, best_probabilities=None,
-            expected_regret=dict(zip(agents, map(float, regrets), strict=True)),
-            not_told_apart=observed.target_winners[1:], chosen_on=chosen_on, observed=observed, tasks=tasks,
-            without=without, least_told=None, basis="", scores=None, draws=None, counts=(),
-        )  # fmt: skip
+        return bare
     every, counts, centre, basis = known
     draws = np.mean(every, axis=0)
     regret = draws.max(axis=1, keepdims=True) - draws
@@ -206,7 +207,8 @@ def decide(inputs: Comparison, asked: Asked, saving: Saving | None = None, seed:
         best_rival, settled = int(centre.argmax()), (middle <= 0.0) | (middle >= 1.0)
         reach = np.hypot(low_high[best_rival, 1] - centre[best_rival], centre - low_high[:, 0])
         most = np.where(settled | settled[best_rival], centre[best_rival] - centre + reach, 0.0)
-    return Decision(
+    return replace(
+        bare,
         winner=agents[place],
         probability_best=float(best[place]),
         expected_regret=dict(zip(agents, map(float, expected), strict=True)),
@@ -217,10 +219,6 @@ def decide(inputs: Comparison, asked: Asked, saving: Saving | None = None, seed:
         },
         best_probabilities=dict(zip(agents, map(float, best), strict=True)),
         not_told_apart=tuple(agents[row] for row in held if row != place),
-        chosen_on=chosen_on,
-        observed=observed,
-        tasks=tasks,
-        without=without,
         least_told=float(1.96 * np.sqrt(2.0) * np.median(spread)),
         basis=basis,
         scores={agent: (float(middle[row]), ends[row]) for row, agent in enumerate(agents)},

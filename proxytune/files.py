@@ -160,11 +160,7 @@ def temporary_folder() -> Iterator[Path]:
 
 
 def _remove_if_left(folder: Path) -> None:
-    """Remove a temporary folder whose process has ended.
-
-    Raises:
-        OSError: If it has not, or the folder is not ours.
-    """
+    """Remove a temporary folder whose process has ended; an OSError says that it has not, or that it is not ours."""
     if time.time() - folder.lstat().st_mtime < NEW_S:
         return
     lock = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)

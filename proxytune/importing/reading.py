@@ -191,12 +191,7 @@ def read_as(folder: Path, shown: Path) -> Log:
 
 @contextmanager
 def writable(folder: Path) -> Iterator[None]:
-    """Tell in one line what keeps a folder from being written.
-
-    Raises:
-        InputError: If something else is there.
-        RunError: If anything else does.
-    """
+    """Tell in one line what keeps a folder from being written: an InputError if something is there, else a RunError."""
     try:
         yield
     except FileExistsError:

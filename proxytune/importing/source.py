@@ -186,11 +186,7 @@ def finite(text: str) -> float | None:
 
 
 def read_geometry(given: list[str]) -> dict[str, float]:
-    """Measures of a robot from texts such as baseline_m=0.16.
-
-    Raises:
-        InputError: If one is no such figure.
-    """
+    """Measures of a robot from texts such as baseline_m=0.16; any other is an InputError."""
     geometry = {}
     for text in given:
         key, _, value = text.partition("=")

@@ -40,11 +40,7 @@ Instants = tuple[Whole, Whole, Floats]
 
 
 def read_camera(settings: Section) -> StatedCamera | None:
-    """Read what log.toml states of its pictures; None where it states nothing.
-
-    Raises:
-        SettingsError: If a key is missing, unknown or impossible.
-    """
+    """Read what log.toml states of its pictures; None where it states nothing."""
     if not {"camera", "frames"} & set(settings.keys()):
         return None
     table = settings.section("camera")

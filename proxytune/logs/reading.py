@@ -29,8 +29,7 @@ Value = TypeVar("Value")
 def read_description(settings: Section) -> tuple[Log, StatedCamera | None]:
     """Read log.toml: the log without a drive yet, 0 Hz where poses have times of their own, and its pictures.
 
-    Raises:
-        LogError: With everything that is wrong, in one line.
+    All that is wrong is told in one line.
     """
     wrong: list[str] = []
 

@@ -228,11 +228,7 @@ def decide(inputs: Comparison, asked: Asked, saving: Saving | None = None, seed:
 
 
 def chosen(inputs: Comparison, decide_on: str) -> tuple[list[int], str]:
-    """The metrics that a decision averages over, by column, and what that is called.
-
-    Raises:
-        InputError: If the metric is not there, or metrics of two directions were to be averaged.
-    """
+    """The metrics that a decision averages over, by column, and what that is called; two directions have no average."""
     names = [metric.name for metric in inputs.metrics]
     alike = len({metric.direction for metric in inputs.metrics}) == 1
     driven = np.concatenate([side.values[side.driven].ravel() for side in (inputs.proxy, inputs.target)])

@@ -56,9 +56,6 @@ def ppv(inputs: Comparison, beta: Mapping[str, float] | None = None) -> Ppv:
     The definition taken: Σ_m β_m |M_m(proxy) − M_m(target)|, averaged over the agents. Without β each metric weighs
     one over its spread on the target (standard deviation of the agents' means), so that PPV counts standard deviations.
     Direction and tolerance of the metrics play no part.
-
-    Raises:
-        InputError: If a weight is missing, unknown, negative or not finite.
     """
     weights = weights_of_spread(inputs.target.means)
     if beta is not None:

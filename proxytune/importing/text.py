@@ -92,7 +92,7 @@ def read_text_table(path: Path, names: Sequence[str] = ()) -> Table:
         raise LogError(f"{path}: is not text in UTF-8; save it as a text table in that encoding") from None
     if "\0" in text:
         raise LogError(f"{path}: is a binary file; save it as a text table, such as CSV")
-    comments, lines = _split_comments(_numbered(text))
+    comments, lines = _split_comments(text)
     if not lines:
         raise LogError(f"{path}: is empty; it needs a line of column names and a row for each sample")
     separator = ""
@@ -118,7 +118,7 @@ def first_rows(path: Path, count: int = 4) -> list[list[str]]:
     try:
         with path.open("rb") as file:
             text = codecs.getincrementaldecoder("utf-8-sig")().decode(file.read(HEAD_BYTES))
-        _, lines = _split_comments(_numbered(text))
+        _, lines = _split_comments(text)
         separator = _separator(lines[0][1]) if lines else ""
         return [_cells(path, number, line, separator) for number, line in lines[:count]]
     except (OSError, UnicodeDecodeError, LogError):
@@ -134,13 +134,9 @@ def is_number(cell: str) -> bool:
     return True
 
 
-def _numbered(text: str) -> Lines:
-    """Lines that are not blank, with their numbers."""
-    return [(number, line) for number, line in enumerate(text.splitlines(), start=1) if line.strip(" \t,;")]
-
-
-def _split_comments(lines: Lines) -> tuple[Lines, Lines]:
-    """The comments before the first row, and all that is no comment."""
+def _split_comments(text: str) -> tuple[Lines, Lines]:
+    """Lines that are not blank, with their numbers: the comments before the first row, and all that is no comment."""
+    lines = [(number, line) for number, line in enumerate(text.splitlines(), start=1) if line.strip(" \t,;")]
     rows = [line for line in lines if not line[1].lstrip().startswith("#")]
     first = rows[0][0] if rows else 0
     return [line for line in lines if line[0] < first], rows

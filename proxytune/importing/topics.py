@@ -9,14 +9,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from proxytune.errors import LogError
-from proxytune.importing.bag import COMMAND_TYPES, Bag, Topic, bags_in, form_of, open_bag, read_commands, read_poses
-from proxytune.importing.bag_scene import choose_transform, read_chain, read_pictures, read_transforms
+from proxytune.importing.bag import COMMAND_TYPES, Topic, bags_in, form_of, open_bag, read_commands, read_poses
+from proxytune.importing.bag_scene import TRANSFORMS, choose_transform, read_chain, read_pictures, read_transforms
 from proxytune.importing.source import Channel, Drive, Source, Wanted
 from proxytune.importing.vesc import KIND as VESC, pair_topics, read_vesc, servo_of
 from proxytune.logs import COMMANDS
 from proxytune.settings import nearest
-
-TRANSFORMS = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
 
 
 def short(kind: str) -> str:
@@ -191,7 +189,7 @@ def read_bag(path: Path, wanted: Wanted) -> Source:
     if choice.of_transforms and not choice.transform:
         first = next(iter(bags.values()))
         with open_bag(first) as opened:
-            transforms = read_transforms(opened, _transform_topics(opened))
+            transforms = read_transforms(opened)
         choice = replace(choice, transform=choose_transform(transforms, f"{first}: {choice.poses.name}"))
     drives = []
     notes = [*notes_of(topics, choice), *notes]
@@ -236,8 +234,8 @@ def _read_drive(name: str, path: Path, choice: Choice, wanted: Wanted) -> tuple[
                 commands, notes = read_commands(bag, choice.commands.name, choice.kind, wanted.stamps)
             said += notes
         if choice.of_transforms:
-            transforms, where = read_transforms(bag, _transform_topics(bag)), f"{bag.path}: {choice.poses.name}"
-            poses, notes = read_chain(transforms, choice.transform, wanted.stamps, where)
+            where = f"{bag.path}: {choice.poses.name}"
+            poses, notes = read_chain(read_transforms(bag), choice.transform, wanted.stamps, where)
         else:
             poses, notes = read_poses(bag, choice.poses.name, wanted.stamps)
         said += notes
@@ -245,7 +243,3 @@ def _read_drive(name: str, path: Path, choice: Choice, wanted: Wanted) -> tuple[
             pictures, notes = read_pictures(bag, choice.pictures.name, wanted.stamps)
             said += notes
     return Drive(name, commands, poses, pictures), said
-
-
-def _transform_topics(bag: Bag) -> tuple[str, ...]:
-    return tuple(topic.name for topic in bag.topics if topic.kind in TRANSFORMS and topic.known)

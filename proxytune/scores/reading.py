@@ -82,16 +82,7 @@ def read_cells(
     that is not there under the name that it is given may have its name from here. `side` is whose columns to take where
     a table has both sides', `part` the dictionary in a Python file.
     """
-    separator = ","
-    rows: Iterator[tuple[int, list[str]]]
-    if forms.is_form(path):
-        named, given = forms.form_rows(path, part)
-        rows = iter(given)
-    else:
-        text = _text(path)
-        separator = _separator(text)
-        rows = _rows(path, text, separator)
-        named = _first(path, rows)
+    named, rows, separator = _opened(path, part)
     ours = {theirs: name for name, theirs in (columns or {}).items() if theirs in named}
     alias = forms.agent_column(named)
     if alias is not None and "agent" not in {*named, *(columns or {})}:
@@ -190,30 +181,32 @@ def _number(text: str) -> float:
 
 def column_names(path: Path, part: str | None = None) -> list[str]:
     """The columns of a file, as its first line names them."""
+    return _opened(path, part)[0]
+
+
+def _opened(path: Path, part: str | None) -> tuple[list[str], Iterator[forms.Line], str]:
+    """The columns that a file's first line names, its rows, and what separates columns: a comma if nothing does."""
     if forms.is_form(path):
-        return forms.form_rows(path, part)[0]
-    text = _text(path)
-    return _first(path, _rows(path, text, _separator(text)))
-
-
-def _text(path: Path) -> str:
+        named, lines = forms.form_rows(path, part)
+        return named, iter(lines), ","
     try:
-        return read_text(path, "utf-8-sig")
+        text = read_text(path, "utf-8-sig")
     except FileNotFoundError:
         raise ScoresError(f"{path}: no such file; check the path") from None
     except OSError as problem:
         raise ScoresError(f"{path}: cannot be read ({problem.strerror})") from None
     except UnicodeDecodeError:
         raise _no_csv(path) from None
-
-
-def _separator(text: str) -> str:
-    """The separator of the columns that the first line names; a comma where there is none."""
     first = next((line for line in text.splitlines() if line.strip()), "")
-    return max(SEPARATORS, key=first.count)
+    separator = max(SEPARATORS, key=first.count)
+    rows = _rows(path, text, separator)
+    _, names = next(rows, (0, []))
+    if not names:
+        raise ScoresError(f"{path}: is empty; its first line must name the columns, agent and metrics among them")
+    return [cell.strip() for cell in names], rows, separator
 
 
-def _rows(path: Path, text: str, separator: str) -> Iterator[tuple[int, list[str]]]:
+def _rows(path: Path, text: str, separator: str) -> Iterator[forms.Line]:
     """Line number and cells of each line that is not empty."""
     lines = io.TextIOWrapper(io.BytesIO(text.encode()), encoding="utf-8", newline="")
     reader = csv.reader(lines, strict=True, delimiter=separator)
@@ -225,16 +218,8 @@ def _rows(path: Path, text: str, separator: str) -> Iterator[tuple[int, list[str
         raise _no_csv(path) from None
 
 
-def _first(path: Path, rows: Iterator[tuple[int, list[str]]]) -> list[str]:
-    """The names in the first line."""
-    _, cells = next(rows, (0, []))
-    if not cells:
-        raise ScoresError(f"{path}: is empty; its first line must name the columns, agent and metrics among them")
-    return [cell.strip() for cell in cells]
-
-
 def _columns(
-    path: Path, rows: Iterable[tuple[int, list[str]]], header: Sequence[str], names: Collection[str]
+    path: Path, rows: Iterable[forms.Line], header: Sequence[str], names: Collection[str]
 ) -> tuple[list[int], dict[str, list[str]]]:
     """Line numbers, and the cells of the columns of these names."""
     places = {name: header.index(name) for name in names if name in header}

@@ -290,22 +290,17 @@ COLUMNS = ("time", *(field for field in POSE if field != "heading"))
 def is_tum(path: Path) -> bool:
     """True for a text file of eight numbers a line, or named .tum; or a folder of such named files."""
     if path.is_dir():
-        return any(_trajectory_files(path))
+        return any(path.glob("*.tum"))
     if path.suffix.lower() == ".tum":
         return path.is_file()
     rows = first_rows(path)
     return bool(rows) and all(len(row) == len(COLUMNS) and all(map(is_number, row)) for row in rows)
 
 
-def _trajectory_files(path: Path) -> list[Path]:
-    """The trajectories: the file itself, or those of a folder."""
-    return sorted(path.glob("*.tum")) if path.is_dir() else [path]
-
-
 def read_tum(path: Path, wanted: Wanted) -> Source:
     """Read TUM trajectories, a drive each, and the commands of each from a second file (`find_commands`)."""
     check_fields(wanted.columns, str(path))
-    parts = [_read_one(file, wanted) for file in _trajectory_files(path)]
+    parts = [_read_one(file, wanted) for file in (sorted(path.glob("*.tum")) if path.is_dir() else [path])]
     return _together(f"{len(parts)} TUM trajectories" if len(parts) > 1 else "TUM trajectory", parts)
 
 

@@ -210,6 +210,7 @@ HALF = 0.3
 
 def prpv_figure(rows: Sequence[Compared]) -> Figure:
     """A panel per set of agents: PRPV before and after with 95 % intervals, over the bracket of the noise floor."""
+    rows = [row for row in rows if row.key in ("prpv", "held_out")]
     figure = Figure(figsize=(report.COLUMN, 0.62 * report.COLUMN), layout="constrained")
     panels = figure.subplots(1, len(rows), squeeze=False)[0]
     for axes, row in zip(panels, rows, strict=True):

@@ -251,6 +251,21 @@ def read_text(path: Path, encoding: str = "utf-8", usual_mb: float = TEXT_MB) ->
     return path.read_text(encoding=encoding)
 
 
+NO_CSV = "is not a CSV file; save it as comma-separated text (UTF-8)"
+
+
+def table_text(path: Path, kind: type[InputError], *, missing: str = "check the path", no_text: str = NO_CSV) -> str:
+    """The text of a table; whatever keeps it from being read is a complaint of this kind, in one line."""
+    try:
+        return read_text(path, "utf-8-sig")
+    except FileNotFoundError:
+        raise kind(f"{path}: no such file; {missing}") from None
+    except OSError as problem:
+        raise kind(f"{path}: cannot be read ({problem.strerror})") from None
+    except UnicodeDecodeError:
+        raise kind(f"{path}: {no_text}") from None
+
+
 def check_end(path: Path, usual_mb: float = TEXT_MB) -> None:
     """Refuse a file that has no end or, in a few kilobytes of a disk, is of gigabytes.
 

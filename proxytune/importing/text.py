@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from proxytune.arrays import Floats
 from proxytune.errors import LogError
 from proxytune.logs import COMMANDS, ENABLED
-from proxytune.settings import check_end
+from proxytune.settings import table_text
 
 EMPTY = ("", "nan", "NaN", "NAN", "na", "NA", "n/a", "N/A", "null", "NULL", "none", "None")
 """What stands in a cell in which there is nothing."""
@@ -81,15 +81,7 @@ Lines = list[tuple[int, str]]
 
 def read_text_table(path: Path, names: Sequence[str] = ()) -> Table:
     """Read a text file; where `names` are given it has none of its own, and blanks between its cells."""
-    try:
-        check_end(path)
-        text = path.read_bytes().decode("utf-8-sig")
-    except FileNotFoundError:
-        raise LogError(f"{path}: no such file; check the path") from None
-    except OSError as problem:
-        raise LogError(f"{path}: cannot be read ({problem.strerror})") from None
-    except UnicodeDecodeError:
-        raise LogError(f"{path}: is not text in UTF-8; save it as a text table in that encoding") from None
+    text = table_text(path, LogError, no_text="is not text in UTF-8; save it as a text table in that encoding")
     if "\0" in text:
         raise LogError(f"{path}: is a binary file; save it as a text table, such as CSV")
     comments, lines = _split_comments(text)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from proxytune.arrays import Flags, Floats, Whole
 from proxytune.errors import LogError
-from proxytune.settings import nearest, read_text
+from proxytune.settings import NO_CSV, nearest, table_text
 
 AT_ONCE = 10_000
 """So many rows are read at a time."""
@@ -44,15 +44,12 @@ def read_cells(path: Path) -> tuple[list[str], Iterator[Block]]:
 
 def _rows(path: Path) -> Iterator[tuple[int, list[str]]]:
     """Number and cells of every line that is not blank."""
+    text = table_text(path, LogError, missing="a log has its samples beside log.toml")
     try:
-        rows = csv.reader(_lines(read_text(path, "utf-8-sig")), strict=True)
+        rows = csv.reader(_lines(text), strict=True)
         yield from ((line, row) for line, row in enumerate(rows, start=1) if any(row))
-    except FileNotFoundError:
-        raise LogError(f"{path}: no such file; a log has its samples beside log.toml") from None
-    except OSError as problem:
-        raise LogError(f"{path}: cannot be read ({problem.strerror})") from None
-    except (UnicodeDecodeError, csv.Error):
-        raise LogError(f"{path}: is not a CSV file; save it as comma-separated text (UTF-8)") from None
+    except csv.Error:
+        raise LogError(f"{path}: {NO_CSV}") from None
 
 
 def _lines(text: str) -> Iterator[str]:

@@ -19,7 +19,7 @@ from proxytune.errors import ScoresError
 from proxytune.files import csv_text, draft_of
 from proxytune.scores import forms
 from proxytune.scores.table import LARGEST, ScoreTable
-from proxytune.settings import nearest, read_text
+from proxytune.settings import NO_CSV, nearest, table_text
 
 SEPARATORS = (",", ";", "\t")
 Columns = Mapping[str, str]
@@ -189,14 +189,7 @@ def _opened(path: Path, part: str | None) -> tuple[list[str], Iterator[forms.Lin
     if forms.is_form(path):
         named, lines = forms.form_rows(path, part)
         return named, iter(lines), ","
-    try:
-        text = read_text(path, "utf-8-sig")
-    except FileNotFoundError:
-        raise ScoresError(f"{path}: no such file; check the path") from None
-    except OSError as problem:
-        raise ScoresError(f"{path}: cannot be read ({problem.strerror})") from None
-    except UnicodeDecodeError:
-        raise _no_csv(path) from None
+    text = table_text(path, ScoresError)
     first = next((line for line in text.splitlines() if line.strip()), "")
     separator = max(SEPARATORS, key=first.count)
     rows = _rows(path, text, separator)
@@ -215,7 +208,7 @@ def _rows(path: Path, text: str, separator: str) -> Iterator[forms.Line]:
             if cells:
                 yield reader.line_num, cells
     except csv.Error:
-        raise _no_csv(path) from None
+        raise ScoresError(f"{path}: {NO_CSV}") from None
 
 
 def _columns(
@@ -233,10 +226,6 @@ def _columns(
         for name, place in places.items():
             cells[name].append(row[place].strip())
     return lines, cells
-
-
-def _no_csv(path: Path) -> ScoresError:
-    return ScoresError(f"{path}: is not a CSV file; save it as comma-separated text (UTF-8)")
 
 
 def _check_header(path: Path, header: Sequence[str], metrics: Sequence[str]) -> None:

@@ -54,8 +54,10 @@ class ImportReport:
     def document(self) -> dict[str, Any]:
         """The JSON document of `import --json`."""
         written = None if self.log is None else str(self.log)
-        drives = [asdict(one) for one in self.source.surveys]
-        return self.source.facts | {"log": written, "drives": drives, "cautions": list(self.cautions)}
+        found, drives = self.source, [asdict(one) for one in self.source.surveys]
+        channels = [{"name": c.name, "type": c.kind, "count": c.count, "role": c.role} for c in found.channels]
+        facts = {"form": found.form, "channels": channels, "notes": list(found.notes)}
+        return facts | {"log": written, "drives": drives, "cautions": list(self.cautions)}
 
 
 def import_log(

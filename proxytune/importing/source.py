@@ -123,12 +123,6 @@ class Source:
     notes: tuple[str, ...]
     surveys: tuple[Survey, ...] = ()
 
-    @property
-    def facts(self) -> dict[str, Any]:
-        """The statements of a JSON document on it."""
-        channels = [{"name": c.name, "type": c.kind, "count": c.count, "role": c.role} for c in self.channels]
-        return {"form": self.form, "channels": channels, "notes": list(self.notes)}
-
 
 @dataclass(frozen=True)
 class Wanted:

@@ -138,8 +138,8 @@ def _read_samples(path: Path, command: str, *, apart: bool) -> Rows:
     columns = () if apart else COMMANDS[command]
     why = "samples beside a commands.csv" if apart else f"commands of kind '{command}'"
     switch = () if apart or command == "none" else (ENABLED,)
-    some = {"together": WHEELS, "optional": switch, "may_lack": (*POSE, *WHEELS)}
-    samples = read_rows(path, (*columns, *POSE), why, **some, fewest=2)
+    may_lack = (*POSE, *WHEELS)
+    samples = read_rows(path, (*columns, *POSE), why, together=WHEELS, optional=switch, may_lack=may_lack, fewest=2)
     for together in (POSE, WHEELS):
         empty = np.isnan(samples.columns(together)) if together[0] in samples.values else np.empty((0, len(together)))
         half = empty.any(axis=1) & ~empty.all(axis=1)

@@ -22,7 +22,7 @@ from proxytune.scores import ROUNDING, ScoreTable
 from proxytune.settings import nearest
 from proxytune.usefulness.comparison import Comparison, by_start, start_of
 from proxytune.usefulness.resampling import CONFIDENCE, Ends, interval
-from proxytune.usefulness.saving import Saving, effective, is_rate, rate_intervals
+from proxytune.usefulness.saving import Saving, effective, is_rate, rate_intervals, saving_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -429,6 +429,17 @@ class Together:
     proxies: tuple[str, str]
     saves: Saving
     decision: Decision
+
+
+def compare_all(
+    inputs: Mapping[str, Comparison], saves: Mapping[str, Saving], asked: Asked, seed: int = 0
+) -> tuple[tuple[Difference, ...], Together]:
+    """Every two proxies of a target, by what choosing by them gains and what they save; the two best savers at once."""
+    names = sorted(saves, key=lambda name: -(saves[name].real_rollouts_worth or 0.0))[:2]
+    one, other = (inputs[name] for name in names)
+    both = saving_of(one, chosen(one, asked.decide_on)[0][0], other)
+    together = Together((names[0], names[1]), both, decide(one, asked, both, seed))
+    return (*compare_choices(inputs, asked, seed), *compare_savings(saves)), together
 
 
 def mmrv_conventions(inputs: Comparison) -> dict[str, dict[str, float]]:

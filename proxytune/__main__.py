@@ -21,11 +21,7 @@ _exit = os._exit
 
 
 def run() -> int:
-    """Run the command line.
-
-    Returns:
-        Its exit status.
-    """
+    """Run the command line; its exit status."""
     _open_descriptors()
     _on_signals(_end_before)
     for name in UNSET:
@@ -80,14 +76,10 @@ def _end_before(number: int, frame: FrameType | None) -> None:
 
 
 class _Guard:
-    """Sees to it that nothing but the command itself ends it with status 0; use as a context.
-
-    Attributes:
-        status: How the command ended; None while it is under way.
-    """
+    """Sees to it that nothing but the command itself ends it with status 0; use as a context."""
 
     def __init__(self) -> None:
-        self.status: int | None = None
+        self.status: int | None = None  # while it is under way
         self._process = os.getpid()
 
     def __enter__(self) -> "_Guard":

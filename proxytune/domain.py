@@ -163,23 +163,17 @@ class Demonstration(NamedTuple):
 
 
 Policy = Callable[[NDArray[Any]], NDArray[np.float64]]
-"""What has been learnt: from one observation to one command, whatever was asked before."""
+"""What has been learnt: from one observation to one command, whatever was asked before.
 
-
-class BatchPolicy(Protocol):
-    """A policy that can also answer many observations at once, each as it answers that one, to the bit."""
-
-    def __call__(self, observation: NDArray[Any], /) -> NDArray[np.float64]:
-        """The command for one observation."""
-        ...
-
-    def act_many(self, observations: NDArray[Any], /) -> NDArray[np.float64]:
-        """The commands (n, channels) for observations (n, …)."""
-        ...
+It may have `act_many(observations)` too: commands (n, channels) for observations (n, …), each as for that one, to the
+bit.
+"""
 
 
 class Classroom(DomainFamily, Protocol):
     """A domain family that can also teach: it has an expert to imitate, and a score for who has learnt.
+
+    It may have `examine_together(episodes, policy)` too: what `examine` gives for each episode, faster than one by one.
 
     Attributes:
         best_score: What a flawless episode scores.
@@ -220,17 +214,5 @@ class OnPolicyClassroom(Classroom, Protocol):
 
         Raises:
             EpisodeError: If the domain or the policy fails.
-        """
-        ...
-
-
-class BatchClassroom(Classroom, Protocol):
-    """A classroom that can examine a policy in several episodes at once, faster than one after the other."""
-
-    def examine_together(self, episodes: Sequence[Episode], policy: Policy) -> Sequence[float]:
-        """The score of a policy in each episode, what `examine` gives for it.
-
-        Raises:
-            EpisodeError: As in `examine`.
         """
         ...

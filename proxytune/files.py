@@ -1,19 +1,21 @@
 """Files and folders that are written whole or not at all: as a draft beside them, which takes their name at last.
 
 Where that cannot be is told before the work that ends there (`check_place`). Also folders for the moment
-(`temporary_folder`), and what travels with the package: robots and studies (`shipped`), templates (`fill_template`).
+(`temporary_folder`), tables as CSV, and what travels with the package: robots and studies (`shipped`), templates.
 """
 
 import contextlib
+import csv
 import errno
 import fcntl
 import filecmp
+import io
 import os
 import platform
 import shutil
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from string import Template
 
@@ -158,11 +160,7 @@ def temporary_folder() -> Iterator[Path]:
 
 
 def _remove_if_left(folder: Path) -> None:
-    """Remove a temporary folder whose process has ended.
-
-    Raises:
-        OSError: If it has not, or the folder is not ours.
-    """
+    """Remove a temporary folder whose process has ended; an OSError says that it has not, or that it is not ours."""
     if time.time() - folder.lstat().st_mtime < NEW_S:
         return
     lock = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
@@ -204,6 +202,13 @@ def shipped(kind: str) -> Path:
         if (home / kind).is_dir():
             return home / kind
     raise SettingsError(f"{package}: the folder '{kind}' is missing; install proxytune again")
+
+
+def csv_text(columns: Sequence[str], rows: Iterable[Sequence[str | float | None]]) -> str:
+    """A table as CSV; cells without a value are empty."""
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerows([columns, *rows])
+    return text.getvalue()
 
 
 def fill_template(room: str, template: str, /, **values: object) -> str:

@@ -48,13 +48,9 @@ def nearest(name: str, known: Iterable[str]) -> str:
 
 
 def alike_caution(what: str, names: Iterable[str]) -> str:
-    """The caution about different names that read the same; empty if none do.
+    """The caution about different names of something, as "agents", that read the same; empty if none do.
 
     They may differ by Unicode form, by blanks and what is not seen at all, or in how a number is written.
-
-    Args:
-        what: What has them, as in "agents".
-        names: All of them.
     """
     known: dict[object, str] = {}
     pairs = []
@@ -71,12 +67,7 @@ def alike_caution(what: str, names: Iterable[str]) -> str:
 
 
 def figure_cautions(figures: Mapping[str, float], where: str) -> tuple[str, ...]:
-    """Sentences on a robot's figures that are probably in another unit.
-
-    Args:
-        figures: By the names of robot.toml; others are not looked at.
-        where: Who states them, as in "robot.toml".
-    """
+    """Sentences on a robot's figures, by robot.toml's names for them, that are probably in another unit."""
     return tuple(
         f"{where}: its {name} is {figures[name]:.4g} {unit}, and robots have {low:g} to {high:g} {unit}; check that"
         for name, (low, high, unit) in SIZES.items()
@@ -260,12 +251,23 @@ def read_text(path: Path, encoding: str = "utf-8", usual_mb: float = TEXT_MB) ->
     return path.read_text(encoding=encoding)
 
 
+NO_CSV = "is not a CSV file; save it as comma-separated text (UTF-8)"
+
+
+def table_text(path: Path, kind: type[InputError], *, missing: str = "check the path", no_text: str = NO_CSV) -> str:
+    """The text of a table; whatever keeps it from being read is a complaint of this kind, in one line."""
+    try:
+        return read_text(path, "utf-8-sig")
+    except FileNotFoundError:
+        raise kind(f"{path}: no such file; {missing}") from None
+    except OSError as problem:
+        raise kind(f"{path}: cannot be read ({problem.strerror})") from None
+    except UnicodeDecodeError:
+        raise kind(f"{path}: {no_text}") from None
+
+
 def check_end(path: Path, usual_mb: float = TEXT_MB) -> None:
     """Refuse a file that has no end or, in a few kilobytes of a disk, is of gigabytes.
-
-    Args:
-        path: The file.
-        usual_mb: The most that it may have [MB], where nobody has raised it.
 
     Raises:
         OSError: If it is a device, a named pipe or larger than that, or is not there.

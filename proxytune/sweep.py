@@ -37,7 +37,6 @@ from proxytune.usefulness import (
     MEASURES,
     PODS,
     Assessment,
-    Ends,
     Measure,
     Measured,
     assess,
@@ -75,15 +74,6 @@ REPLAYED = "f1b2d6a3eda6bd6409dcf09bb3bf65753aad6648d68c23ac343b313fa66dcbc8"
 METRICS = {"pod_pose": "m", "pod_image": "of full scale"}
 
 
-class Observed(Protocol):
-    """The answer to commands: poses (ticks + 1, 3), the start first; pictures (steps, rows, columns, channels)."""
-
-    @property
-    def poses(self) -> Any: ...  # noqa: D102 - described above
-    @property
-    def pictures(self) -> Any: ...  # noqa: D102
-
-
 class Replayable(DomainFamily, Protocol):
     """A domain family that can also repeat commands, and be a key of a cache."""
 
@@ -93,8 +83,11 @@ class Replayable(DomainFamily, Protocol):
         """Drive an episode; the answer's `commands` (control steps, …) are what the agent issued."""
         ...
 
-    def replay(self, episode: Episode, commands: Any) -> Observed:
-        """Drive commands in place of the episode's agent, from the episode's start and with its seed."""
+    def replay(self, episode: Episode, commands: Any) -> Any:
+        """Drive commands in place of the episode's agent, from the episode's start and with its seed.
+
+        The answer has `poses` (ticks + 1, 3), the start first, and `pictures` (steps, rows, columns, channels).
+        """
         ...
 
 
@@ -141,7 +134,7 @@ class Discrepancy:
 
 
 @functools.lru_cache(maxsize=64)
-def _on_target(target: Replayable, episode: Episode) -> tuple[Any, Observed]:
+def _on_target(target: Replayable, episode: Episode) -> tuple[Any, Any]:
     """Commands of the agent and the poses they led to; the same at every point of a sweep."""
     commands = np.asarray(target.drive(episode).commands)[:COMMANDS]
     return commands, target.replay(episode, commands)
@@ -333,21 +326,12 @@ UNKNOWN = Measured(None, None)
 
 
 @dataclass(frozen=True)
-class SweepEstimate:
-    """A measure at one value of the parameter; None where it is undefined or has no interval."""
-
-    value: float
-    score: float | None
-    interval: Ends | None
-
-
-@dataclass(frozen=True)
 class Series:
-    """One measure along the parameter, ALL or of one metric: an estimate per point, in rising order."""
+    """One measure along the parameter, ALL or of one metric: an estimate by each value of that, in rising order."""
 
     measure: Measure
     metric: str
-    estimates: tuple[SweepEstimate, ...]
+    estimates: Mapping[float, Measured]
 
     @property
     def key(self) -> str:
@@ -364,8 +348,7 @@ def series_of(curve: SweepCurve) -> tuple[Series, ...]:
     """Every measure of a curve; POD only where it was asked for."""
 
     def along(measure: Measure, metric: str, found: Sequence[Measured]) -> Series:
-        pairs = zip(curve.points, found, strict=True)
-        return Series(measure, metric, tuple(SweepEstimate(point.value, *one) for point, one in pairs))
+        return Series(measure, metric, dict(zip((point.value for point in curve.points), found, strict=True)))
 
     series = []
     for measure in MEASURES:
@@ -436,7 +419,7 @@ class _Cost:
 def shape_of(series: Series, held: float | None) -> Shape:
     """Describe one measure round the value at which its parameter is held, as a pure function."""
     sign = 1.0 if series.measure.lower_is_better else -1.0
-    costs = [cost for estimate in series.estimates if (cost := _cost(estimate, sign))]
+    costs = [cost for value, one in series.estimates.items() if (cost := _cost(value, one, sign))]
     if not costs:
         return Shape((), None, (), held, "unseen", "unseen")
     least = min(cost.cost for cost in costs)
@@ -464,7 +447,8 @@ def describe_shape(series: Series, held: float | None) -> str:
 
 def _listed(chosen: Sequence[float], series: Series) -> str:
     """The values as a range where they are one, by name where there are gaps."""
-    between = [one.value for one in series.estimates if chosen[0] <= one.value <= chosen[-1] and one.score is not None]
+    known = (value for value, one in series.estimates.items() if one.value is not None)
+    between = [value for value in known if chosen[0] <= value <= chosen[-1]]
     if len(chosen) > 1 and len(between) == len(chosen):
         return f"{_number(chosen[0])} to {_number(chosen[-1])}"
     return ", ".join(map(_number, chosen))
@@ -474,14 +458,12 @@ def _number(value: float) -> str:
     return f"{value:.4g}".replace("-", "−")
 
 
-def _cost(estimate: SweepEstimate, sign: float) -> _Cost | None:
-    if estimate.score is None:
+def _cost(value: float, measured: Measured, sign: float) -> _Cost | None:
+    if measured.value is None:
         return None
-    cost = sign * estimate.score
-    if estimate.interval is None:
-        return _Cost(estimate.value, cost, -math.inf, math.inf)
-    low, high = sorted(sign * end for end in estimate.interval)
-    return _Cost(estimate.value, cost, min(low, cost), max(high, cost))
+    cost = sign * measured.value
+    low, high = sorted(sign * end for end in measured.interval or (-math.inf, math.inf))
+    return _Cost(value, cost, min(low, cost), max(high, cost))
 
 
 def _side(costs: Sequence[_Cost], held: float | None, direction: int) -> Side:

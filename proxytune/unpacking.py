@@ -8,7 +8,7 @@ import zipfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import IO, Any, Protocol
+from typing import IO, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,12 +27,7 @@ PICTURE_MB = 200
 
 
 def check_unpacked(where: object, size: float, usual_mb: float) -> None:
-    """Refuse what would unpack to more bytes than is allowed.
-
-    Args:
-        where: What it is, as a complaint names it.
-        size: Bytes that it unpacks to.
-        usual_mb: The limit of its kind [MB], where nobody has raised it.
+    """Refuse what would unpack to more bytes than the usual limit of its kind [MB], or what somebody has raised it to.
 
     Raises:
         InputError: If it does, with what raises the limit; or if what is to raise it is no number.
@@ -45,10 +40,6 @@ def check_unpacked(where: object, size: float, usual_mb: float) -> None:
 
 def read_arrays(path: Path, usual_mb: float = ARRAYS_MB) -> dict[str, NDArray[Any]]:
     """The arrays of an .npz file, by name.
-
-    Args:
-        path: The file.
-        usual_mb: The limit of them all together [MB], where nobody has raised it.
 
     Raises:
         InputError: If they unpack to more than is allowed.
@@ -65,12 +56,9 @@ def read_arrays(path: Path, usual_mb: float = ARRAYS_MB) -> dict[str, NDArray[An
 
 @contextmanager
 def open_picture(source: Path | IO[bytes], where: object, formats: tuple[str, ...]) -> Iterator[Image.Image]:
-    """A picture whose size is known and whose pixels are not unpacked yet.
+    """A picture whose size is known and whose pixels are not unpacked yet; a complaint names `where` it is.
 
-    Args:
-        source: The file.
-        where: What it is, as a complaint names it.
-        formats: What it may be, as Pillow calls them; others are handed to no decoder.
+    It may be of these formats, as Pillow calls them; others are handed to no decoder.
 
     Raises:
         InputError: If its pixels take more than is allowed.
@@ -89,29 +77,13 @@ def open_picture(source: Path | IO[bytes], where: object, formats: tuple[str, ..
         Image.MAX_IMAGE_PIXELS = kept
 
 
-class Decompressor(Protocol):
-    """What bz2, lz4 and zstd have in common."""
-
-    @property
-    def eof(self) -> bool:
-        """True at the end of the packed bytes."""
-        ...
-
-    @property
-    def unused_data(self) -> bytes:
-        """What comes after that."""
-        ...
-
-    def decompress(self, data: bytes, max_length: int) -> bytes:
-        """The next bytes, no more than these."""
-        ...
-
-
 AT_ONCE = 2**20
 
 
-def unpacked_size(new: Callable[[], Decompressor], data: bytes, most: float) -> int:
+def unpacked_size(new: Callable[[], Any], data: bytes, most: float) -> int:
     """The bytes that packed ones unpack to, counted a megabyte at a time, up to where they are too many.
+
+    A `new` decompressor, of bz2, lz4 or zstd, has `decompress`, `eof` and `unused_data`.
 
     Raises:
         Exception: The decompressor's own, where they are damaged.

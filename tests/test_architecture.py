@@ -72,6 +72,7 @@ SHORT = {
     "arrays",  # types, and one setting of NumPy
     "driving/agent",  # a protocol
     "learning/learner",  # a protocol
+    "lineage",  # what its table says
 }
 """Modules below 60 lines: protocols and types; doors (`__init__`) and commands, one module each, go without saying."""
 

@@ -225,7 +225,7 @@ def test_every_measure_is_spelt_out_and_has_its_formula(measure):
 
 def test_every_room_is_on_the_page_about_architecture_in_order_and_every_name_on_that_of_the_api():
     listing = (path.name for path in (ROOT / "proxytune").iterdir())
-    rooms = {name.removesuffix(".py") for name in listing if not name.startswith(("__", "py."))}
+    rooms = {name.partition(".")[0] for name in listing if not name.startswith(("__", "py."))}
     named = re.findall(r"^\| `proxytune\.(\w+)", section(DOCS["architecture.md"], "The rooms"), flags=re.MULTILINE)
     assert rooms == set(named)
     assert [floor(room) for room in named] == sorted(floor(room) for room in named), "a room stands before one it needs"

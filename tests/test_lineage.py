@@ -51,9 +51,7 @@ def package(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("family", lineage.ROOMS)
 def test_code_that_means_something_else_is_decided_upon(family):
-    hint = (
-        f"all episodes proven the same? then append it to SAME_CODE['{family}'] in proxytune/lineage.py, else see there"
-    )
+    hint = f"all episodes proven the same? then append it to '{family}' in proxytune/lineage.toml, else see lineage.py"
     code = lineage.code_meaning(family)
     assert code in lineage.SAME_CODE[family], f"code of {family} means {code}; {hint}"
 

@@ -237,13 +237,13 @@ def test_a_base_that_the_family_cannot_take_is_refused(make_study, base, expecte
 
 
 def series(scores, spread=0.0, higher=False):
-    found = [
-        sweep.SweepEstimate(
-            float(place), score, None if score is None or spread is None else (score - spread, score + spread)
+    found = {
+        float(place): sweep.Measured(
+            score, None if score is None or spread is None else (score - spread, score + spread)
         )
         for place, score in enumerate(scores)
-    ]
-    return sweep.Series(replace(PRPV, better="higher" if higher else "lower"), ALL, tuple(found))
+    }
+    return sweep.Series(replace(PRPV, better="higher" if higher else "lower"), ALL, found)
 
 
 VALLEY = series([9.0, 4.0, 1.0, 3.0, 8.0])

@@ -67,7 +67,7 @@ class SweepReport(report.Shown):
         """For each parameter, one row per value: each measure."""
         return {
             curve.parameter: pd.DataFrame(
-                {one.key: [estimate.score for estimate in one.estimates] for one in sweep.series_of(curve)},
+                {one.key: [found.value for found in one.estimates.values()] for one in sweep.series_of(curve)},
                 index=pd.Index([point.value for point in curve.points], name=curve.parameter),
             )
             for curve in self.curves

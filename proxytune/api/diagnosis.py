@@ -1,7 +1,7 @@
 """A diagnosis from Python: what a model lacks of a log, of motion and camera."""
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, nullcontext
+from collections.abc import Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -157,7 +157,7 @@ def diagnose(
     """
     if seed < 0:
         raise InputError(f"seed must be at least 0, got {seed}")
-    with _opened(log) as drives, nullcontext() if test is None else _opened(test) as others:
+    with open_log(log) as (drives, _), nullcontext((None, ())) if test is None else open_log(test) as (others, _):
         try:
             vehicle = robot_of(drives, robot, Catalogue(Path.cwd(), tuple(effects)))
             found = diagnose_log(drives, vehicle, declared, test=others, seed=seed, rules=rules, limits=limits)
@@ -167,12 +167,3 @@ def diagnose(
             for option, argument in IN_PYTHON.items():
                 told = told.replace(option, argument)
             raise type(problem)(told) from None
-
-
-@contextmanager
-def _opened(log: Log | str | Path) -> Iterator[Log]:
-    if isinstance(log, Log):
-        yield log
-    else:
-        with open_log(Path(log)) as (opened, _):
-            yield opened

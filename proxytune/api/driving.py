@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pandas as pd
 
+from proxytune import study as studies
 from proxytune.domain import DomainFamily, make_episode
 from proxytune.effects import SHIPPED, Catalogue, read_model
 from proxytune.errors import InputError
@@ -13,16 +14,6 @@ from proxytune.report import frame_html
 from proxytune.seeds import episode_seed
 from proxytune.space import Theta
 from proxytune.storage import FILE_NAME as DATABASE
-from proxytune.study import (
-    StudySettings,
-    check_episode,
-    check_robot,
-    family_catalogue,
-    load_family,
-    open_settings,
-    read_study_settings,
-    record_episode,
-)
 from proxytune.sweep import best_theta, has_answer
 
 
@@ -66,18 +57,20 @@ def drive(
         InputError: If there is no such study, agent, parameter or start.
         EpisodeError: If the agent or the domain fails.
     """
-    settings = read_study_settings(Path(study))
-    family = load_family(settings, settings.proxy)
-    check_episode(family, agent, theta or {}, start)
+    settings = studies.read_study_settings(Path(study))
+    family = studies.load_family(settings, settings.proxy)
+    studies.check_episode(family, agent, theta or {}, start)
     if seed is not None and seed < 0:
         raise InputError(f"seed must be at least 0, got {seed}")
     own = episode_seed(settings.seed if seed is None else seed, start)
-    kept = record_episode(family, make_episode(theta or {}, agent=agent, start=start, seed=own))
+    kept = studies.record_episode(family, make_episode(theta or {}, agent=agent, start=start, seed=own))
     poses, commands = (pd.DataFrame(dict(columns)) if columns else None for columns in (kept.poses, kept.commands))
     return DrivenEpisode(dict(kept.metrics), poses, commands)
 
 
-def choose_theta(text: str | None, settings: StudySettings, family: DomainFamily, option: str) -> tuple[Theta, str]:
+def choose_theta(
+    text: str | None, settings: studies.StudySettings, family: DomainFamily, option: str
+) -> tuple[Theta, str]:
     """θ as an option has it, and where from: "best", "nominal" or "given".
 
     Without an option it is the study's best, or the nominal one as long as no trial is finished.
@@ -86,15 +79,15 @@ def choose_theta(text: str | None, settings: StudySettings, family: DomainFamily
         InputError: If the text is no θ, the model is of another robot, or the study has no best θ.
     """
     if text == "best" or (text is None and (settings.home / DATABASE).is_file()):
-        study = open_settings(settings)
+        study = studies.open_settings(settings)
         if text == "best" or has_answer(study):
             return best_theta(study, option), "best"
     if text is not None and text.endswith(".toml"):
-        check_robot(family, Path(text), option)
+        studies.check_robot(family, Path(text), option)
         if (own := getattr(family, "truth", None)) is not None:
             # A family with parameters that are no effects reads them itself
             return own(Path(text)), "given"
-    theta = read_theta(text, family_catalogue(family, settings), option)
+    theta = read_theta(text, studies.family_catalogue(family, settings), option)
     return theta, "nominal" if text in (None, "nominal") else "given"
 
 

@@ -64,15 +64,10 @@ class FleetReport(report.Shown):
         Without rows where fewer than two robots can be explained.
         """
         told = self.result
-        rows = {
-            name: {
-                "varies": told.varies[name],
-                **_columns("mean", mean),
-                **_columns("deviation", told.deviation[name]),
-                **_columns("robots", told.next_robot[name]),
-            }
-            for name, mean in told.mean.items()
-        }
+        rows: dict[str, dict[str, float]] = {name: {"varies": told.varies[name]} for name in told.mean}
+        for key, figures in (("mean", told.mean), ("deviation", told.deviation), ("robots", told.next_robot)):
+            for name, row in rows.items():
+                row |= _columns(key, figures[name])
         return pd.DataFrame.from_dict(rows, orient="index").rename_axis("parameter")
 
     def document(self) -> dict[str, Any]:

@@ -1,7 +1,7 @@
 """Ways in and out of proxytune from Python: logs of others, score tables of a twin, predictions."""
 
 from collections.abc import Callable
-from contextlib import nullcontext, suppress
+from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -54,8 +54,10 @@ class ImportReport:
     def document(self) -> dict[str, Any]:
         """The JSON document of `import --json`."""
         written = None if self.log is None else str(self.log)
-        drives = [asdict(one) for one in self.source.surveys]
-        return self.source.facts | {"log": written, "drives": drives, "cautions": list(self.cautions)}
+        found, drives = self.source, [asdict(one) for one in self.source.surveys]
+        channels = [{"name": c.name, "type": c.kind, "count": c.count, "role": c.role} for c in found.channels]
+        facts = {"form": found.form, "channels": channels, "notes": list(found.notes)}
+        return facts | {"log": written, "drives": drives, "cautions": list(self.cautions)}
 
 
 def import_log(
@@ -289,8 +291,7 @@ def predict(
     keys = {figure: key for key, figure in GEOMETRY.items()}
     stated = {keys[name]: value for name, value in (fitted.geometry or {}).items() if name in keys}
     named = replace(known, robot=known.robot or fitted.robot, figures=known.figures or stated)
-    opened = nullcontext((log, ())) if isinstance(log, Log) else open_log(Path(log), wanted or Wanted(), named)
-    with opened as (drives, _):
+    with open_log(log, wanted or Wanted(), named) as (drives, _):
         if frames is not None:
             folder = Path(frames)
             numbers, errors = list[int](), list[float]()

@@ -8,12 +8,11 @@ import importlib
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from types import ModuleType
 from typing import Any, NamedTuple
 
 
 class Command(NamedTuple):
-    """A command: its module, loaded only when it is asked for, its line in the help, and examples for that."""
+    """A command: its module, or a function of one, loaded only when it is asked for, its line in the help, examples."""
 
     module: str
     summary: str
@@ -30,9 +29,10 @@ class Command(NamedTuple):
         kept = self.kept or ("everything finished is kept" if self.resumes else "nothing was written")
         return f"{kept}; run the same command to {'continue' if self.resumes else 'start again'}"
 
-    def load(self) -> ModuleType:
-        """The module."""
-        return importlib.import_module(f"proxytune.cli.{self.module}")
+    def load(self) -> Any:
+        """The function that runs the command: `run` of its module, or the one that is named."""
+        module, _, function = self.module.partition(".")
+        return getattr(importlib.import_module(f"proxytune.cli.{module}"), function or "run")
 
 
 TABLES, OPTIONS = (

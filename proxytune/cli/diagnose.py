@@ -1,6 +1,7 @@
 """`diagnose`: find the effect that the model lacks, from a log of measured drives and frames."""
 
 import argparse
+import tomllib
 from contextlib import nullcontext
 from pathlib import Path
 
@@ -19,30 +20,7 @@ from proxytune.importing import finite, open_log
 from proxytune.logs import Log
 from proxytune.report import diagnosis_text
 
-MOTION = {
-    "fitting what is declared": 0.02,
-    "looking for what is missing, round 1": 0.05,
-    "looking for what is missing, round 2": 0.4,
-    "looking for what is missing, round 3": 0.6,
-    "looking for what is missing, round 4": 0.68,
-    "weighing what each effect is worth": 0.72,
-    "fitting to windows of prediction": 0.75,
-    "learning what no named effect explains": 0.8,
-    "testing on drives kept aside": 0.85,
-    "confirming on the bullet plant": 0.86,
-    "designing the next drive": 0.9,
-    "drawing": 0.96,
-}
-"""The share of a diagnosis of motion that has usually passed when each of its steps begins."""
-CAMERA = {
-    "reading frames": 0.0,
-    "fitting the camera": 0.05,
-    "looking for what the camera lacks": 0.13,
-    "testing on frames kept aside": 0.27,
-    "looking at brightness and sharpness": 0.7,
-    "drawing": 0.87,
-}
-"""The same of a camera's."""
+STEPS: dict[str, dict[str, float]] = tomllib.loads(Path(__file__).with_name("steps.toml").read_text(encoding="utf-8"))
 MOTION_SHARE = 0.8
 """Of the time of both; the camera comes last."""
 
@@ -92,8 +70,8 @@ def run(arguments: argparse.Namespace) -> Answer:
 def shares(log: Log) -> dict[str, float]:
     """The share of the whole time that has usually passed when each step begins."""
     if log.frames is None:
-        return MOTION
+        return STEPS["motion"]
     if log.command == "none":
-        return CAMERA
-    motion = {step: MOTION_SHARE * share for step, share in MOTION.items()}
-    return motion | {step: MOTION_SHARE + (1.0 - MOTION_SHARE) * share for step, share in CAMERA.items()}
+        return STEPS["camera"]
+    motion = {step: MOTION_SHARE * share for step, share in STEPS["motion"].items()}
+    return motion | {step: MOTION_SHARE + (1.0 - MOTION_SHARE) * share for step, share in STEPS["camera"].items()}

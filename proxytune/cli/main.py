@@ -115,12 +115,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     # Of effects that are typed the code is asked for; what a file names is another's wish
     typed = names_in(getattr(arguments, "effects", ""))
     with nullcontext() if command.runs_code else running_none(arguments.command, typed):
-        return run_command(
-            lambda: command.load().run(arguments),
-            arguments,
-            program=f"proxytune {arguments.command}",
-            left=command.left,
-        )
+        run, program = (lambda: command.load()(arguments)), f"proxytune {arguments.command}"
+        return run_command(run, arguments, program=program, left=command.left)
 
 
 def run_command(answer_of: Callable[[], Answer], arguments: argparse.Namespace, *, program: str, left: str) -> int:

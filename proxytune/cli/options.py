@@ -80,11 +80,7 @@ NOT_COPIED = (*MADE, "study.db*", "study.lock", "report.html", "__pycache__")
 
 
 def check_made(folder: Path) -> None:
-    """Refuse a study's folder in which its figures and its page cannot be written, before anything is simulated.
-
-    Raises:
-        InputError: If they cannot.
-    """
+    """Refuse a study's folder in which its figures and its page cannot be written, before anything is simulated."""
     check_place(folder / "figures", folder=True, ours=True)
     check_place(folder / "report.html", ours=True)
 

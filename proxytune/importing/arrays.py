@@ -40,11 +40,7 @@ WIDEST = 16
 
 
 def load_arrays(path: Path) -> Arrays:
-    """Read every array of an .npz file.
-
-    Raises:
-        InputError: If it unpacks to more than is allowed.
-    """
+    """Read every array of an .npz file that does not unpack to more than is allowed."""
     try:
         arrays = unpacking.read_arrays(path)
     except InputError:

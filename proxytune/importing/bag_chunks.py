@@ -10,10 +10,10 @@ import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from pathlib import Path
-from typing import IO, Any, NamedTuple, cast
+from typing import IO, Any, NamedTuple
 
 from proxytune.settings import allowed_bytes
-from proxytune.unpacking import BAG_MB, Decompressor, check_unpacked, unpacked_size
+from proxytune.unpacking import BAG_MB, check_unpacked, unpacked_size
 
 DENSEST = 100
 """Times its own size: pictures of a world that stands still pack so well, and hardly anything else."""
@@ -27,20 +27,12 @@ class Chunk(NamedTuple):
 
 
 def check_bag_size(path: Path) -> None:
-    """Refuse a bag whose files unpack to more than is allowed; what is damaged is left to whoever reads it.
-
-    Raises:
-        InputError: With what raises the limit.
-    """
+    """Refuse a bag whose files unpack to more than is allowed; what is damaged is left to whoever reads it."""
     _check(path, (chunk for file in _files(path) for chunk in _chunks(file)))
 
 
 def check_messages_size(path: Path, reader: Any) -> None:
-    """Refuse a bag whose messages, each packed by itself, unpack to more; the library's reader of it is open.
-
-    Raises:
-        InputError: With what raises the limit.
-    """
+    """Refuse a bag whose messages, each packed by itself, unpack to more; the library's reader of it is open."""
     inside: list[Any] = [getattr(one, "storage", None) for one in reader.readers]
     folders = [one for one in inside if hasattr(one, "storages")]
     packed = [folder for folder in folders if folder.metadata.compression_mode == "message"]
@@ -61,13 +53,14 @@ def _check(path: Path, chunks: Iterable[Chunk]) -> None:
             check_unpacked(path, size, most / 1e6)
 
 
-def _decompressor(packing: str) -> Callable[[], Decompressor]:
+def _decompressor(packing: str) -> Callable[[], Any]:
     if packing == "bz2":
         return bz2.BZ2Decompressor
     if packing == "lz4":
         from lz4.frame import LZ4FrameDecompressor
 
-        return cast(Callable[[], Decompressor], LZ4FrameDecompressor)
+        made: Callable[[], Any] = LZ4FrameDecompressor
+        return made
     if sys.version_info >= (3, 14):
         from compression.zstd import ZstdDecompressor
     else:

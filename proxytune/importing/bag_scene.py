@@ -33,6 +33,7 @@ from proxytune.importing.source import Pictures, Poses
 from proxytune.logs import BROKEN
 from proxytune.unpacking import open_picture
 
+TRANSFORMS = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
 WORLDS = ("map", "world", "odom")
 ROBOTS = ("base_link", "base_footprint")
 
@@ -54,10 +55,10 @@ class Transform:
         return bool((self.values != self.values[0]).any())
 
 
-def read_transforms(bag: Bag, topics: tuple[str, ...]) -> dict[str, Transform]:
+def read_transforms(bag: Bag) -> dict[str, Transform]:
     """The transforms of a bag, by parent and child; of topics named tf_static the last message holds for all times."""
     rows: dict[str, list[Row]] = defaultdict(list)
-    for topic in topics:
+    for topic in (topic.name for topic in bag.topics if topic.kind in TRANSFORMS and topic.known):
         for number, (receive_ns, message) in enumerate(bag.messages(topic), start=1):
             with complaints(bag.path, f"{topic}, message {number}: is not what its type says"):
                 for each in message.transforms:

@@ -102,9 +102,6 @@ def read_source(path: Path, wanted: Wanted, offset_s: float = 0.0) -> Source:
     """Read a source: its drives with stamps in order, and notes on what was taken and what is odd.
 
     Its poses are stamped later than its commands by `offset_s`, as far as that is known [s].
-
-    Raises:
-        LogError: If it is none of the known forms, or lacks what a log needs.
     """
     if not path.exists():
         raise LogError(f"{path}: no such folder; check the path")
@@ -194,12 +191,7 @@ def read_as(folder: Path, shown: Path) -> Log:
 
 @contextmanager
 def writable(folder: Path) -> Iterator[None]:
-    """Tell in one line what keeps a folder from being written.
-
-    Raises:
-        InputError: If something else is there.
-        RunError: If anything else does.
-    """
+    """Tell in one line what keeps a folder from being written: an InputError if something is there, else a RunError."""
     try:
         yield
     except FileExistsError:
@@ -230,29 +222,28 @@ NO_FACTS = Facts()
 
 
 @contextmanager
-def open_log(path: Path, wanted: Wanted = NOTHING, facts: Facts = NO_FACTS) -> Iterator[tuple[Log, tuple[str, ...]]]:
-    """A log's folder, or a bag or table as the log that `import` would make of it, and what was found on the way.
+def open_log(
+    source: Log | str | Path, wanted: Wanted = NOTHING, facts: Facts = NO_FACTS
+) -> Iterator[tuple[Log, tuple[str, ...]]]:
+    """A log itself, its folder, or a bag or table as the log that `import` makes of it, and what was found on the way.
 
     What is imported lies in a temporary folder for as long as the log is open.
-
-    Raises:
-        LogError: If it is neither.
     """
+    if isinstance(source, Log):
+        yield source, ()
+        return
+    path = Path(source)
     if (path / "log.toml").is_file() or (path / "samples.csv").is_file():
         yield read_log(path), ()
         return
-    source = read_source(path, wanted, facts.offset_s)
-    with as_log(with_named_pictures(source, facts), facts, path) as log:
-        yield log, source.notes
+    found = read_source(path, wanted, facts.offset_s)
+    with as_log(with_named_pictures(found, facts), facts, path) as log:
+        yield log, found.notes
 
 
 @contextmanager
 def as_log(source: Source, facts: Facts, path: Path) -> Iterator[Log]:
-    """The log that a source makes, read at a path, in a temporary folder for as long as it is open.
-
-    Raises:
-        LogError: If it makes none.
-    """
+    """The log that a source makes, read at a path, in a temporary folder for as long as it is open."""
     with temporary_folder() as folder:
         with writable(folder):
             fill_log(folder, source, facts, path.resolve().stem, origin=path.name)

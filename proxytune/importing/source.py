@@ -123,12 +123,6 @@ class Source:
     notes: tuple[str, ...]
     surveys: tuple[Survey, ...] = ()
 
-    @property
-    def facts(self) -> dict[str, Any]:
-        """The statements of a JSON document on it."""
-        channels = [{"name": c.name, "type": c.kind, "count": c.count, "role": c.role} for c in self.channels]
-        return {"form": self.form, "channels": channels, "notes": list(self.notes)}
-
 
 @dataclass(frozen=True)
 class Wanted:
@@ -186,11 +180,7 @@ def finite(text: str) -> float | None:
 
 
 def read_geometry(given: list[str]) -> dict[str, float]:
-    """Measures of a robot from texts such as baseline_m=0.16.
-
-    Raises:
-        InputError: If one is no such figure.
-    """
+    """Measures of a robot from texts such as baseline_m=0.16; any other is an InputError."""
     geometry = {}
     for text in given:
         key, _, value = text.partition("=")

@@ -11,7 +11,7 @@ dataset. International Journal of Robotics Research 30 (8), 2011.
 import itertools
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -42,14 +42,8 @@ STEMS = ("commands", "cmd_vel", "cmd")
 COMMAND_SUFFIXES = (".csv", ".tsv", ".txt")
 
 
-@dataclass(frozen=True)
-class CommandFile:
-    """A file of commands: these by the drive that it names, or "" where it names none, and what was taken for what."""
-
-    path: Path
-    commands: Mapping[str, Commands]
-    channels: tuple[Channel, ...]
-    note: str
+CommandsOf = Mapping[str, Commands]
+"""The commands of a file by the drive that it names, or "" where it names none."""
 
 
 def find_commands(path: Path, wanted: Wanted) -> Path | None:
@@ -71,8 +65,8 @@ def find_commands(path: Path, wanted: Wanted) -> Path | None:
     return next((place for place in beside if place != path and place.is_file()), None)
 
 
-def read_commands(path: Path, wanted: Wanted) -> CommandFile:
-    """Read a file of commands: a table with stamps and the columns of one kind of command."""
+def read_commands(path: Path, wanted: Wanted) -> tuple[CommandsOf, tuple[Channel, ...], str]:
+    """Read a file of commands, a table with stamps and the columns of one kind; and say what was taken for what."""
     table = read_text_table(path)
     stated = {ours: entry for ours, entry in wanted.columns.items() if ours in COMMAND_FIELDS or named_in(table, entry)}
     found = choose_columns(table, stated, ("time", "episode", *COMMAND_FIELDS))
@@ -80,41 +74,41 @@ def read_commands(path: Path, wanted: Wanted) -> CommandFile:
     used = {field: columns[field] for field in ("time", "episode", *COMMANDS[kind], ENABLED) if field in columns}
     commands = commands_by_drive(table, used, kind)
     channels = tuple(replace(c, name=f"{path.name}: {c.name}") for c in channels_of(table, used))
-    return CommandFile(path, commands, channels, f"Commands of {path.name}: {described(used)}.")
+    return commands, channels, f"Commands of {path.name}: {described(used)}."
 
 
-def share_commands(file: CommandFile, drives: Sequence[Drive], labels: Sequence[str]) -> list[Drive]:
-    """Give each drive its commands: by name, or by time where the file names no drives.
+def share_commands(path: Path, known: CommandsOf, drives: Sequence[Drive], labels: Sequence[str]) -> list[Drive]:
+    """Give each drive its commands of a file: by name, or by time where the file names no drives.
 
     A drive may also go by its label, which is what the table of poses calls it.
     """
-    unnamed = set(file.commands) == {""} or set(labels) == {""}
-    if unnamed and len(file.commands) == 1 and len(drives) == 1:
-        return [replace(drives[0], commands=next(iter(file.commands.values())))]
-    if set(file.commands) == {""}:
-        return _by_time(file, drives)
-    known = {*labels, *(drive.name for drive in drives)}
-    for name in file.commands:
-        if name not in known:
-            raise LogError(f"{file.path}: drive '{name}' has no poses; {nearest(name, known)}")
+    unnamed = set(known) == {""} or set(labels) == {""}
+    if unnamed and len(known) == 1 and len(drives) == 1:
+        return [replace(drives[0], commands=next(iter(known.values())))]
+    if set(known) == {""}:
+        return _by_time(path, known[""], drives)
+    driven = {*labels, *(drive.name for drive in drives)}
+    for name in known:
+        if name not in driven:
+            raise LogError(f"{path}: drive '{name}' has no poses; {nearest(name, driven)}")
     shared = []
     for drive, label in zip(drives, labels, strict=True):
-        commands = file.commands.get(drive.name) or file.commands.get(label)
+        commands = known.get(drive.name) or known.get(label)
         if commands is None:
-            raise LogError(f"{file.path}: has no commands for drive '{drive.name}'; add them, or leave its poses out")
+            raise LogError(f"{path}: has no commands for drive '{drive.name}'; add them, or leave its poses out")
         shared.append(replace(drive, commands=commands))
     return shared
 
 
-def _by_time(file: CommandFile, drives: Sequence[Drive]) -> list[Drive]:
+def _by_time(path: Path, commands: Commands, drives: Sequence[Drive]) -> list[Drive]:
     """Cut commands where drives begin and end; the one in force at a beginning belongs to the drive."""
     spans = sorted((drive.poses.times.min(), drive.poses.times.max()) for drive in drives)
     if any(end >= begin for (_, end), (begin, _) in itertools.pairwise(spans)):
         raise LogError(
-            f"{file.path}: names no drives, and the drives overlap in time, so that commands cannot be shared out; "
+            f"{path}: names no drives, and the drives overlap in time, so that commands cannot be shared out; "
             "add a column 'episode', or give each drive a file of commands"
         )
-    commands, shared = file.commands[""], []
+    shared = []
     for drive in drives:
         begin, end = drive.poses.times.min(), drive.poses.times.max()
         during = (commands.times >= begin) & (commands.times <= end)
@@ -123,7 +117,7 @@ def _by_time(file: CommandFile, drives: Sequence[Drive]) -> list[Drive]:
             during[before[np.argmax(commands.times[before])]] = True
         if not during.any():
             raise LogError(
-                f"{file.path}: has no command while '{drive.name}' was driven, {begin:.12g} to {end:.12g} s; "
+                f"{path}: has no command while '{drive.name}' was driven, {begin:.12g} to {end:.12g} s; "
                 "check that both files have stamps of one clock"
             )
         own = replace(commands, times=commands.times[during], values=commands.values[during])
@@ -161,10 +155,10 @@ def read_csv_tables(path: Path, wanted: Wanted) -> Source:
         mine = [(source.drives, labels) for source, labels, place in recordings if place == apart]
         group = [drive for own, _ in mine for drive in own]
         if apart:
-            commands = read_commands(apart, wanted)
-            group = share_commands(commands, group, [label for _, labels in mine for label in labels])
-            channels += commands.channels
-            notes.append(commands.note)
+            commands, own_channels, note = read_commands(apart, wanted)
+            group = share_commands(apart, commands, group, [label for _, labels in mine for label in labels])
+            channels += own_channels
+            notes.append(note)
         drives += group
     return replace(whole, drives=tuple(drives), channels=tuple(channels), notes=tuple(dict.fromkeys(notes)))
 
@@ -296,22 +290,17 @@ COLUMNS = ("time", *(field for field in POSE if field != "heading"))
 def is_tum(path: Path) -> bool:
     """True for a text file of eight numbers a line, or named .tum; or a folder of such named files."""
     if path.is_dir():
-        return any(_trajectory_files(path))
+        return any(path.glob("*.tum"))
     if path.suffix.lower() == ".tum":
         return path.is_file()
     rows = first_rows(path)
     return bool(rows) and all(len(row) == len(COLUMNS) and all(map(is_number, row)) for row in rows)
 
 
-def _trajectory_files(path: Path) -> list[Path]:
-    """The trajectories: the file itself, or those of a folder."""
-    return sorted(path.glob("*.tum")) if path.is_dir() else [path]
-
-
 def read_tum(path: Path, wanted: Wanted) -> Source:
     """Read TUM trajectories, a drive each, and the commands of each from a second file (`find_commands`)."""
     check_fields(wanted.columns, str(path))
-    parts = [_read_one(file, wanted) for file in _trajectory_files(path)]
+    parts = [_read_one(file, wanted) for file in (sorted(path.glob("*.tum")) if path.is_dir() else [path])]
     return _together(f"{len(parts)} TUM trajectories" if len(parts) > 1 else "TUM trajectory", parts)
 
 
@@ -328,10 +317,10 @@ def _read_one(path: Path, wanted: Wanted) -> Source:
             f"{path}: a TUM file holds no commands; lay {path.stem}_commands.csv (time, v, omega) beside it, name "
             "another file with --commands FILE, or write --commands none for a log without them"
         )
-    commands = read_commands(file, wanted)
+    commands, channels, note = read_commands(file, wanted)
     return replace(
         source,
-        drives=tuple(share_commands(commands, [drive], [""])),
-        channels=(*source.channels, *commands.channels),
-        notes=(*source.notes, commands.note),
+        drives=tuple(share_commands(file, commands, [drive], [""])),
+        channels=(*source.channels, *channels),
+        notes=(*source.notes, note),
     )

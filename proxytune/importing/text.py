@@ -6,6 +6,7 @@ takes "score" for two columns cut at s and a row too long for one with an index,
 
 import codecs
 import csv
+import tomllib
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -18,7 +19,7 @@ from numpy.typing import NDArray
 from proxytune.arrays import Floats
 from proxytune.errors import LogError
 from proxytune.logs import COMMANDS, ENABLED
-from proxytune.settings import check_end
+from proxytune.settings import table_text
 
 EMPTY = ("", "nan", "NaN", "NAN", "na", "NA", "n/a", "N/A", "null", "NULL", "none", "None")
 """What stands in a cell in which there is nothing."""
@@ -80,18 +81,10 @@ Lines = list[tuple[int, str]]
 
 def read_text_table(path: Path, names: Sequence[str] = ()) -> Table:
     """Read a text file; where `names` are given it has none of its own, and blanks between its cells."""
-    try:
-        check_end(path)
-        text = path.read_bytes().decode("utf-8-sig")
-    except FileNotFoundError:
-        raise LogError(f"{path}: no such file; check the path") from None
-    except OSError as problem:
-        raise LogError(f"{path}: cannot be read ({problem.strerror})") from None
-    except UnicodeDecodeError:
-        raise LogError(f"{path}: is not text in UTF-8; save it as a text table in that encoding") from None
+    text = table_text(path, LogError, no_text="is not text in UTF-8; save it as a text table in that encoding")
     if "\0" in text:
         raise LogError(f"{path}: is a binary file; save it as a text table, such as CSV")
-    comments, lines = _split_comments(_numbered(text))
+    comments, lines = _split_comments(text)
     if not lines:
         raise LogError(f"{path}: is empty; it needs a line of column names and a row for each sample")
     separator = ""
@@ -117,7 +110,7 @@ def first_rows(path: Path, count: int = 4) -> list[list[str]]:
     try:
         with path.open("rb") as file:
             text = codecs.getincrementaldecoder("utf-8-sig")().decode(file.read(HEAD_BYTES))
-        _, lines = _split_comments(_numbered(text))
+        _, lines = _split_comments(text)
         separator = _separator(lines[0][1]) if lines else ""
         return [_cells(path, number, line, separator) for number, line in lines[:count]]
     except (OSError, UnicodeDecodeError, LogError):
@@ -133,13 +126,9 @@ def is_number(cell: str) -> bool:
     return True
 
 
-def _numbered(text: str) -> Lines:
-    """Lines that are not blank, with their numbers."""
-    return [(number, line) for number, line in enumerate(text.splitlines(), start=1) if line.strip(" \t,;")]
-
-
-def _split_comments(lines: Lines) -> tuple[Lines, Lines]:
-    """The comments before the first row, and all that is no comment."""
+def _split_comments(text: str) -> tuple[Lines, Lines]:
+    """Lines that are not blank, with their numbers: the comments before the first row, and all that is no comment."""
+    lines = [(number, line) for number, line in enumerate(text.splitlines(), start=1) if line.strip(" \t,;")]
     rows = [line for line in lines if not line[1].lstrip().startswith("#")]
     first = rows[0][0] if rows else 0
     return [line for line in lines if line[0] < first], rows
@@ -190,62 +179,8 @@ COMMAND_FIELDS = (*(field for pair in COMMANDS.values() for field in pair), ENAB
 
 EXAMPLE = "--columns time=stamp_ns:ns,x=pos_x_mm:mm,y=pos_y_mm:mm,heading=yaw_deg:deg,v=cmd_lin,omega=cmd_ang"
 """A column map, for complaints."""
-QUANTITIES: Mapping[str, str] = {
-    "time": "time",
-    "command_time": "time",
-    "episode": "number",
-    **dict.fromkeys(PLACE, "length"),
-    "heading": "angle",
-    **dict.fromkeys(QUATERNION, "number"),
-    "v": "speed",
-    "omega": "turning speed",
-    **dict.fromkeys(COMMANDS["duty"], "duty"),
-    **dict.fromkeys(COMMANDS["wheel_speed"], "turning speed"),
-    **dict.fromkeys(COMMANDS["ackermann"], "duty"),
-    "speed": "speed",
-    "steering_angle": "angle",
-    ENABLED: "number",
-}
-"""What each field measures; episodes and quaternions have no unit."""
-TIMES = "t time times stamp stamps timestamp timestamps headerstamp unixtime elapsed elapsedtime sec secs seconds"
-EPISODES = "episode run drive trial trajectory"
-HEADINGS = "heading yaw theta psi θ ψ headingangle yawangle posetheta poseyaw poseheading"
-PLACES = "# pos# #pos position# #position p# pose# posepos# poseposition# poseposeposition# translation# t# prsr#"
-QUATERNIONS = "q# quat# quaternion# orientation# poseorientation# poseposeorientation# rotation# qrs#"
-SPEEDS = (
-    "v cmdv vcmd cmdlin cmdlinear cmdlinearx cmdvel cmdvelx cmdvellin cmdvellinear cmdvellinearx cmdspeed speedcmd "
-    "linearx commandv vcommand commandspeed commandedspeed"
-)
-TURNING_SPEEDS = (
-    "omega ω w cmdomega omegacmd cmdw wcmd cmdang cmdangular cmdangularz cmdvelang cmdvelangular cmdvelangularz "
-    "cmdveltheta angularz cmdyawrate yawratecmd commandomega omegacommand commandyawrate commandedyawrate"
-)
-DUTIES = "# duty# #duty pwm# #pwm cmd# #cmd u# motor# #motor"
-WHEEL_SPEEDS = "wheelcommand# #wheelcommand wheelcmd# #wheelcmd cmdwheel# wheelspeedcmd# omega#cmd cmdomega#"
-
-
-def _filled(pattern: str, *parts: str) -> frozenset[str]:
-    """The names of a pattern, # standing for any of the parts."""
-    return frozenset(name for part in parts for name in pattern.replace("#", part).split())
-
-
-USUAL: Mapping[str, frozenset[str]] = {
-    "time": _filled(TIMES, ""),
-    "command_time": frozenset(),  # to be stated
-    "episode": _filled(EPISODES, ""),
-    **{axis: _filled(PLACES, axis) for axis in PLACE},
-    "heading": _filled(HEADINGS, ""),
-    **{field: _filled(QUATERNIONS, field[1]) for field in QUATERNION},
-    "v": _filled(SPEEDS, ""),
-    "omega": _filled(TURNING_SPEEDS, ""),
-    "left": _filled(DUTIES, "left"),
-    "right": _filled(DUTIES, "right"),
-    "wheel_command_left": _filled(WHEEL_SPEEDS, "left"),
-    "wheel_command_right": _filled(WHEEL_SPEEDS, "right"),
-    "throttle": _filled("throttle cmdthrottle throttlecmd throttlecommand gas", ""),
-    "steering": _filled("steering steer cmdsteering steeringcmd steeringcommand", ""),
-    "speed": _filled("speed cmdspeed speedcmd drivespeed commandedspeed commandspeed", ""),
-    "steering_angle": _filled("steeringangle drivesteeringangle cmdsteeringangle steeringanglecmd", ""),
-    ENABLED: _filled("enabled enable motorsenabled motorenabled", ""),
-}
-"""Usual names of each field, without underscores and units."""
+FIELDS = tomllib.loads(Path(__file__).with_name("fields.toml").read_text(encoding="utf-8"))
+QUANTITIES: Mapping[str, str] = {field: known["quantity"] for field, known in FIELDS.items()}
+"""What each field measures."""
+USUAL = {field: frozenset(known.get("usual", "").split()) for field, known in FIELDS.items()}
+"""Usual names of each field."""

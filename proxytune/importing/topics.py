@@ -3,19 +3,18 @@
 A topic is taken by its type, its name and its number of messages, unless the user names it.
 """
 
-from collections.abc import Mapping
+import tomllib
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from proxytune.errors import LogError
-from proxytune.importing.bag import COMMAND_TYPES, Bag, Topic, bags_in, form_of, open_bag, read_commands, read_poses
-from proxytune.importing.bag_scene import choose_transform, read_chain, read_pictures, read_transforms
+from proxytune.importing.bag import COMMAND_TYPES, Topic, bags_in, form_of, open_bag, read_commands, read_poses
+from proxytune.importing.bag_scene import TRANSFORMS, choose_transform, read_chain, read_pictures, read_transforms
 from proxytune.importing.source import Channel, Drive, Source, Wanted
 from proxytune.importing.vesc import KIND as VESC, pair_topics, read_vesc, servo_of
 from proxytune.logs import COMMANDS
 from proxytune.settings import nearest
-
-TRANSFORMS = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
 
 
 def short(kind: str) -> str:
@@ -25,18 +24,14 @@ def short(kind: str) -> str:
 
 @dataclass(frozen=True)
 class Role:
-    """Something that a log needs of a bag, the option that names its topic, and types of message by their ranks.
-
-    Names with parts that go first are taken before others, those with parts of something else never; some types are
-    taken only where the topic is asked for by name.
-    """
+    """Something that a log needs of a bag, as roles.toml has it."""
 
     name: str
     option: str
     ranks: Mapping[str, int]
-    first: tuple[str, ...] = ()
-    never: tuple[str, ...] = ()
-    asked: tuple[str, ...] = ()
+    first: Sequence[str] = ()
+    never: Sequence[str] = ()
+    asked: Sequence[str] = ()
 
     def can_be(self, topic: Topic) -> bool:
         """True if a topic has messages that can be read as this."""
@@ -69,22 +64,8 @@ class Role:
 
 KIND_OF = {name: kind for name, (kind, _) in COMMAND_TYPES.items()} | {short(VESC): "speed_steering"}
 """The kind of command that a type of message says; empty where it says none."""
-COMMAND_ROLE = Role(
-    "commands",
-    "--commands",
-    {name: place for place, name in enumerate(KIND_OF)} | {"TwistStamped": 0, "Float64MultiArray": 3},
-    first=("cmd_vel", "cmd", "command"),
-    asked=("JointState",),
-)
-POSE_ROLE = Role(
-    "poses",
-    "--poses",
-    {"PoseStamped": 0, "TransformStamped": 0, "PoseWithCovarianceStamped": 1, "Odometry": 2}
-    | {"TFMessage": 3, "tfMessage": 3},
-    first=("mocap", "vicon", "vrpn", "optitrack", "qualisys", "ground_truth"),
-    never=("goal", "target", "setpoint", "initialpose", "cmd", "command", "tf_static"),
-)
-PICTURE_ROLE = Role("pictures", "--pictures", {"Image": 0, "CompressedImage": 1}, never=("depth", "mask", "debug"))
+ROLES = tomllib.loads(Path(__file__).with_name("roles.toml").read_text(encoding="utf-8"))
+COMMAND_ROLE, POSE_ROLE, PICTURE_ROLE = (Role(name, **table) for name, table in ROLES.items())
 
 
 @dataclass(frozen=True)
@@ -208,7 +189,7 @@ def read_bag(path: Path, wanted: Wanted) -> Source:
     if choice.of_transforms and not choice.transform:
         first = next(iter(bags.values()))
         with open_bag(first) as opened:
-            transforms = read_transforms(opened, _transform_topics(opened))
+            transforms = read_transforms(opened)
         choice = replace(choice, transform=choose_transform(transforms, f"{first}: {choice.poses.name}"))
     drives = []
     notes = [*notes_of(topics, choice), *notes]
@@ -253,8 +234,8 @@ def _read_drive(name: str, path: Path, choice: Choice, wanted: Wanted) -> tuple[
                 commands, notes = read_commands(bag, choice.commands.name, choice.kind, wanted.stamps)
             said += notes
         if choice.of_transforms:
-            transforms, where = read_transforms(bag, _transform_topics(bag)), f"{bag.path}: {choice.poses.name}"
-            poses, notes = read_chain(transforms, choice.transform, wanted.stamps, where)
+            where = f"{bag.path}: {choice.poses.name}"
+            poses, notes = read_chain(read_transforms(bag), choice.transform, wanted.stamps, where)
         else:
             poses, notes = read_poses(bag, choice.poses.name, wanted.stamps)
         said += notes
@@ -262,7 +243,3 @@ def _read_drive(name: str, path: Path, choice: Choice, wanted: Wanted) -> tuple[
             pictures, notes = read_pictures(bag, choice.pictures.name, wanted.stamps)
             said += notes
     return Drive(name, commands, poses, pictures), said
-
-
-def _transform_topics(bag: Bag) -> tuple[str, ...]:
-    return tuple(topic.name for topic in bag.topics if topic.kind in TRANSFORMS and topic.known)

@@ -44,9 +44,6 @@ def read_vesc(bag: Bag, motor: str, gains: Path | None) -> tuple[Commands, tuple
     """Speed [m/s] and wheel angle [rad] of the commands to a VESC, at the times when the bag received them.
 
     The motor's topic has electrical revolutions per minute; the gains are the car's vesc.yaml.
-
-    Raises:
-        LogError: If there is no such file, or it lacks a gain.
     """
     if gains is None:
         raise LogError(f"{bag.path}: {motor}: has a VESC's units; give the car's gains by --vesc vesc.yaml")

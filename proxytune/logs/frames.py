@@ -6,7 +6,6 @@ import zlib
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -16,7 +15,7 @@ from PIL import Image
 from proxytune.arrays import Floats, Whole
 from proxytune.errors import LogError
 from proxytune.logs.log import Frames, LogEpisode
-from proxytune.logs.rows import Layout, Rows, check_known_episodes, read_rows
+from proxytune.logs.rows import Rows, check_known_episodes, read_rows
 from proxytune.logs.times import places_on_grid
 from proxytune.settings import Section
 from proxytune.unpacking import ARRAYS_MB, check_unpacked, open_picture
@@ -31,27 +30,17 @@ MOST_FRAMES = 2**53
 """Whole numbers up to here are exact as read."""
 
 
-class Camera(NamedTuple):
-    """The camera that log.toml states: where its pictures lie, as "frames/%06d.png", and frames of no picture yet.
+StatedCamera = tuple[str, bool, Frames]
+"""The camera of log.toml: where its pictures lie, as "frames/%06d.png", whether [camera] says so, and no frames yet.
 
-    Where [camera] states them, `own_table`; a key of the top level may name pictures that were not passed on.
-    """
-
-    pattern: str
-    own_table: bool
-    stated: Frames
-
-
+A key of the top level may name pictures that were not passed on.
+"""
 Instants = tuple[Whole, Whole, Floats]
 """Numbers of pictures, the drive of each, and its time [s] on the poses' clock, all (N,)."""
 
 
-def read_camera(settings: Section) -> Camera | None:
-    """Read what log.toml states of its pictures; None where it states nothing.
-
-    Raises:
-        SettingsError: If a key is missing, unknown or impossible.
-    """
+def read_camera(settings: Section) -> StatedCamera | None:
+    """Read what log.toml states of its pictures; None where it states nothing."""
     if not {"camera", "frames"} & set(settings.keys()):
         return None
     table = settings.section("camera")
@@ -83,7 +72,7 @@ def read_camera(settings: Section) -> Camera | None:
         readout_s=0.0 if shutter == "global" else readout_s,
         fixed_exposure=table.text("exposure", "auto", choices=("auto", "fixed")) == "fixed",
     )
-    return Camera(pattern, "frames" in table, stated)
+    return pattern, "frames" in table, stated
 
 
 def _road(settings: Section) -> str:
@@ -105,7 +94,7 @@ def _figure(section: Section, key: str, high: float) -> float | None:
 
 
 def read_frames(
-    camera: Camera, folder: Path, samples: Rows, rate_hz: float, episodes: Sequence[LogEpisode]
+    camera: StatedCamera, folder: Path, samples: Rows, rate_hz: float, episodes: Sequence[LogEpisode]
 ) -> Frames | None:
     """Find every picture, those left out that were taken before or after the poses of their drive.
 
@@ -114,15 +103,15 @@ def read_frames(
     """
     listed = (folder / LISTED).exists()
     taken = _read_instants(folder / LISTED, samples, episodes) if listed else _per_row(samples, rate_hz, episodes)
-    numbers, drives, times = taken
-    paths = tuple(folder / (camera.pattern % number) for number in numbers.tolist())
+    (numbers, drives, times), (pattern, own_table, stated) = taken, camera
+    paths = tuple(folder / (pattern % number) for number in numbers.tolist())
     missing = [path for path in paths if not path.is_file()]
-    if len(missing) == len(paths) and not (camera.own_table or listed):
+    if len(missing) == len(paths) and not (own_table or listed):
         return None
     if missing:
         counts = f"no such picture, {len(missing)} of {len(paths)} are missing"
         raise LogError(f"{missing[0]}: {counts}; add them, or name those that there are in {LISTED}")
-    return replace(camera.stated, paths=paths, drives=drives, times=times)
+    return replace(stated, paths=paths, drives=drives, times=times)
 
 
 def _per_row(samples: Rows, rate_hz: float, episodes: Sequence[LogEpisode]) -> Instants:
@@ -139,7 +128,7 @@ def _per_row(samples: Rows, rate_hz: float, episodes: Sequence[LogEpisode]) -> I
 
 def _read_instants(path: Path, samples: Rows, episodes: Sequence[LogEpisode]) -> Instants:
     """The rows of frames.csv that lie within the poses of their drive."""
-    rows = read_rows(path, Layout(("frame",), (), (), (), 1, "frames"))
+    rows = read_rows(path, ("frame",), "frames")
     check_known_episodes(rows, samples.names)
     numbers = rows.values["frame"]
     wrong = (numbers != np.rint(numbers)) | (numbers < 0) | (numbers > MOST_FRAMES)

@@ -32,11 +32,7 @@ WHEELS = ("wheel_left", "wheel_right")
 
 
 def check_kind(command: str, robot: str, drive: str, where: str) -> None:
-    """Refuse commands of another kind than a robot takes that drives as this; a twist is for any.
-
-    Raises:
-        LogError: If they are a car's and the robot is none, or the other way about.
-    """
+    """Refuse commands of another kind than a robot takes that drives as this; a twist is for any."""
     if command not in ("twist", "none") and (command in CAR_COMMANDS) != (drive == "ackermann"):
         drives = "steers" if drive == "ackermann" else "drives by two wheels"
         raise LogError(

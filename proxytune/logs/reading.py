@@ -10,9 +10,9 @@ import numpy as np
 
 from proxytune.arrays import Floats
 from proxytune.errors import LogError, SettingsError
-from proxytune.logs.frames import Camera, read_camera, read_frames
+from proxytune.logs.frames import StatedCamera, read_camera, read_frames
 from proxytune.logs.log import CAR_COMMANDS, COMMANDS, ENABLED, POSE, WHEELS, Log
-from proxytune.logs.rows import Layout, Rows, check_known_episodes, read_cells, read_rows
+from proxytune.logs.rows import Rows, check_known_episodes, read_cells, read_rows
 from proxytune.logs.times import Issued, check_headings, episodes_at_own_times, episodes_on_grid, usual_rate
 from proxytune.settings import GEOMETRY, Section, read_settings
 
@@ -26,11 +26,10 @@ FURTHEST_S = 3600.0
 Value = TypeVar("Value")
 
 
-def read_description(settings: Section) -> tuple[Log, Camera | None]:
+def read_description(settings: Section) -> tuple[Log, StatedCamera | None]:
     """Read log.toml: the log without a drive yet, 0 Hz where poses have times of their own, and its pictures.
 
-    Raises:
-        LogError: With everything that is wrong, in one line.
+    All that is wrong is told in one line.
     """
     wrong: list[str] = []
 
@@ -126,11 +125,7 @@ def read_log(path: str | Path) -> Log:
 
 
 def read_commands(path: Path) -> tuple[str, dict[str, tuple[Floats, Floats]]]:
-    """Read a table as a log's commands.csv: its kind, by its columns, and episodes' times (M,) [s] and commands (M, 2).
-
-    Raises:
-        LogError: If it is not such a table.
-    """
+    """Read a table as a log's commands.csv: its kind, by its columns; episodes' times (M,) [s] and commands (M, 2)."""
     header, _ = read_cells(path)
     kind = next((kind for kind, columns in COMMANDS.items() if columns and {*columns} <= {*header}), "")
     if not kind:
@@ -143,7 +138,8 @@ def _read_samples(path: Path, command: str, *, apart: bool) -> Rows:
     columns = () if apart else COMMANDS[command]
     why = "samples beside a commands.csv" if apart else f"commands of kind '{command}'"
     switch = () if apart or command == "none" else (ENABLED,)
-    samples = read_rows(path, Layout((*columns, *POSE), WHEELS, (*POSE, *WHEELS), switch, 2, why))
+    may_lack = (*POSE, *WHEELS)
+    samples = read_rows(path, (*columns, *POSE), why, together=WHEELS, optional=switch, may_lack=may_lack, fewest=2)
     for together in (POSE, WHEELS):
         empty = np.isnan(samples.columns(together)) if together[0] in samples.values else np.empty((0, len(together)))
         half = empty.any(axis=1) & ~empty.all(axis=1)
@@ -167,7 +163,7 @@ def _commands(rows: Rows, command: str) -> Floats:
 
 def _issued(path: Path, command: str) -> tuple[Rows, dict[str, Issued]]:
     """A table of commands of a kind, and every episode's with their times."""
-    rows = read_rows(path, Layout(COMMANDS[command], (), (), (ENABLED,), 1, f"commands of kind '{command}'"))
+    rows = read_rows(path, COMMANDS[command], f"commands of kind '{command}'", optional=(ENABLED,))
     _check_sizes(rows, command)
     columns = (np.split(each, rows.firsts[1:]) for each in (rows.values["time"], _commands(rows, command)))
     return rows, dict(zip(rows.names, zip(*columns, strict=True), strict=True))

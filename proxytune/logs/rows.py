@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from proxytune.arrays import Flags, Floats, Whole
 from proxytune.errors import LogError
-from proxytune.settings import nearest, read_text
+from proxytune.settings import NO_CSV, nearest, table_text
 
 AT_ONCE = 10_000
 """So many rows are read at a time."""
@@ -44,15 +44,12 @@ def read_cells(path: Path) -> tuple[list[str], Iterator[Block]]:
 
 def _rows(path: Path) -> Iterator[tuple[int, list[str]]]:
     """Number and cells of every line that is not blank."""
+    text = table_text(path, LogError, missing="a log has its samples beside log.toml")
     try:
-        rows = csv.reader(_lines(read_text(path, "utf-8-sig")), strict=True)
+        rows = csv.reader(_lines(text), strict=True)
         yield from ((line, row) for line, row in enumerate(rows, start=1) if any(row))
-    except FileNotFoundError:
-        raise LogError(f"{path}: no such file; a log has its samples beside log.toml") from None
-    except OSError as problem:
-        raise LogError(f"{path}: cannot be read ({problem.strerror})") from None
-    except (UnicodeDecodeError, csv.Error):
-        raise LogError(f"{path}: is not a CSV file; save it as comma-separated text (UTF-8)") from None
+    except csv.Error:
+        raise LogError(f"{path}: {NO_CSV}") from None
 
 
 def _lines(text: str) -> Iterator[str]:
@@ -101,38 +98,38 @@ class Rows:
         return LogError(f"{self.path}: line {self.lines[row]}, column '{column}': {problem}")
 
 
-@dataclass(frozen=True)
-class Layout:
-    """The columns that a table must hold besides `episode` and `time`, and the fewest rows of an episode.
+Names = tuple[str, ...]
 
-    Some are there all or none, may have empty cells, or may be left out; `why` is what needs them, for a complaint.
+
+def read_rows(
+    path: Path,
+    needed: Names,
+    why: str,
+    *,
+    together: Names = (),
+    optional: Names = (),
+    may_lack: Names = (),
+    fewest: int = 1,
+) -> Rows:
+    """Read a table with these columns besides `episode` and `time`, and so many rows an episode at the fewest.
+
+    Some are there all or none, may be left out, or may have empty cells; `why` is what needs them, for a complaint.
     """
-
-    needed: tuple[str, ...]
-    together: tuple[str, ...]
-    may_lack: tuple[str, ...]
-    optional: tuple[str, ...]
-    fewest: int
-    why: str
-
-
-def read_rows(path: Path, layout: Layout) -> Rows:
-    """Read a table."""
     header, blocks = read_cells(path)
-    _check_header(path, header, layout)
-    parts = [_part(path, header, layout, block) for block in blocks]
+    _check_header(path, header, ("episode", "time", *needed), why, together, optional)
+    parts = [_part(path, header, may_lack, block) for block in blocks]
     if not parts:
         raise LogError(f"{path}: has no rows; add one per sample")
     labels = np.concatenate([part.labels for part in parts])
     changes = np.flatnonzero(np.append(True, labels[1:] != labels[:-1]))
     names = tuple(str(label) for label in labels[changes])
     rows = Rows(path, np.concatenate([part.lines for part in parts]), names, changes, {})
-    _check_episodes(rows, layout.fewest)
+    _check_episodes(rows, fewest)
     for name in parts[0].values:
         # The first cell of the first column that has any which is no number
         wrong = next((part.wrong[name] for part in parts if name in part.wrong), None)
         if wrong:
-            allowed = ", or empty where nothing was measured" if name in layout.may_lack else ""
+            allowed = ", or empty where nothing was measured" if name in may_lack else ""
             line, text = wrong
             raise LogError(f"{path}: line {line}, column '{name}': must be a finite number{allowed}, got '{text}'")
     values = {name: np.concatenate([part.values[name] for part in parts]) for name in parts[0].values}
@@ -165,7 +162,7 @@ class _Part(NamedTuple):
     wrong: Mapping[str, tuple[int, str]]
 
 
-def _part(path: Path, header: Sequence[str], layout: Layout, block: Block) -> _Part:
+def _part(path: Path, header: Sequence[str], may_lack: Names, block: Block) -> _Part:
     for line, row in zip(*block, strict=True):
         if len(row) != len(header):
             counts = f"has {len(row)} cells, but the first line names {len(header)} columns"
@@ -176,26 +173,24 @@ def _part(path: Path, header: Sequence[str], layout: Layout, block: Block) -> _P
     texts = {name: np.array([cell.strip() for cell in cells], dtype=object) for name, cells in columns.items()}
     values = {name: pd.to_numeric(own, errors="coerce").astype(np.float64) for name, own in texts.items()}
     odd = {name: ~(np.abs(own) < LARGEST) for name, own in values.items()}
-    for name in set(layout.may_lack) & set(odd):
+    for name in set(may_lack) & set(odd):
         odd[name] &= texts[name] != ""
     firsts = {name: int(np.argmax(own)) for name, own in odd.items() if own.any()}
     wrong = {name: (block.lines[row], str(texts[name][row])) for name, row in firsts.items()}
     return _Part(np.array(block.lines), labels, values, wrong)
 
 
-def _check_header(path: Path, header: Sequence[str], layout: Layout) -> None:
-    needed = ("episode", "time", *layout.needed)
-    together = layout.together if set(layout.together) & set(header) else ()
-    known = (*needed, *layout.together, *layout.optional)
+def _check_header(path: Path, header: Sequence[str], needed: Names, why: str, together: Names, optional: Names) -> None:
+    known = (*needed, *together, *optional)
+    needed = (*needed, *together) if set(together) & set(header) else needed
     for name in header:
         if name not in known:
             raise LogError(f"{path}: line 1: unknown column '{name}'; {nearest(name, known)}")
         if list(header).count(name) > 1:
             raise LogError(f"{path}: line 1: names the column '{name}' twice; take one of them out")
-    for name in (*needed, *together):
+    for name in needed:
         if name not in header:
-            columns = ",".join((*needed, *together))
-            raise LogError(f"{path}: line 1: no column '{name}'; {layout.why} need {columns}")
+            raise LogError(f"{path}: line 1: no column '{name}'; {why} need {','.join(needed)}")
 
 
 def _check_episodes(samples: Rows, fewest: int) -> None:

@@ -130,14 +130,11 @@ def episodes_on_grid(
     placed = np.column_stack((samples.columns(POSE[:2]), unwrapped(samples)))
     poses = spread(placed, places, len(filled))
     wheels = spread(samples.columns(WHEELS), places, len(filled)) if WHEELS[0] in samples.values else None
-    times = samples.values["time"]
-    firsts = (*samples.firsts, len(times))
+    each = zip(samples.names, np.split(samples.values["time"], samples.firsts[1:]), (0, *ends[:-1]), ends, strict=True)
     episodes = []
-    for index, (begin, end) in enumerate(zip((0, *ends[:-1]), ends, strict=True)):
-        own = times[firsts[index] : firsts[index + 1]]
+    for name, own, begin, end in each:
         grid = own[0] + np.arange(end - begin) / rate_hz if rate_hz else own
         speeds = None if wheels is None else wheels[begin:end]
-        name = samples.names[index]
         when, given = issued.get(name, (None, held[begin:end]))
         episodes.append(LogEpisode(name, grid, given, poses[begin:end], speeds, when))
     return tuple(episodes)

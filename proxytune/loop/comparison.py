@@ -190,9 +190,7 @@ def floor_text(level: Level | None, unit: str) -> str:
     if level.floor is None and level.floor_ends:
         return f"{report.short_span(*level.floor_ends)}{unit and ' '}{unit}"
     assert level.floor is not None
-    if level.chance is not None and level.floor_ends:
-        return report.in_pairs(level.floor, *level.floor_ends)
-    return report.with_span(f"{report.short(level.floor)}{unit and ' '}{unit}", *(level.floor_ends or (None, None)))
+    return level_text(Level(level.floor, level.floor_ends, chance=level.chance), unit)
 
 
 def _change(row: Compared) -> str:
@@ -212,6 +210,7 @@ HALF = 0.3
 
 def prpv_figure(rows: Sequence[Compared]) -> Figure:
     """A panel per set of agents: PRPV before and after with 95 % intervals, over the bracket of the noise floor."""
+    rows = [row for row in rows if row.key in ("prpv", "held_out")]
     figure = Figure(figsize=(report.COLUMN, 0.62 * report.COLUMN), layout="constrained")
     panels = figure.subplots(1, len(rows), squeeze=False)[0]
     for axes, row in zip(panels, rows, strict=True):

@@ -8,7 +8,7 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -59,13 +59,6 @@ MOST_STARTS = 4
 """The start that is shown is one of the first so many: each is driven to choose it."""
 
 
-class BothEpisodes(NamedTuple):
-    """One episode beside the target in both tuned proxies."""
-
-    before: SideBySide
-    after: SideBySide
-
-
 def pictures_file(home: Path) -> Path:
     """The file in which a loop keeps titles and captions of the pictures that lie beside them."""
     return home / "righted" / "pictures.json"
@@ -78,17 +71,17 @@ def write_pictures(closed: Closed) -> None:
     texts = []
     if gain and both:
         metrics = [metric.name for metric in closed.loop.settings.metrics]
-        agent, start, starts = gain["agent"], both.before.episode.start, _starts(closed)
+        agent, start, starts = gain["agent"], both["before"].episode.start, _starts(closed)
         pairs = f"{short(gain['wrong_pairs_before'])} before, {short(gain['wrong_pairs_after'])} after"
         chosen = f", where of starts 0 to {starts[-1]} the two are furthest apart on average" if starts[1:] else ""
         first = (
             f"Wrongly ordered pairs with {agent}: {pairs}. Here it drives in the proxy tuned before and in the target, "
             f"under the same seed from start {start}{chosen}."
         )
-        before, after = (f"{say_parting(pair)} {_scores(pair, metrics)}" for pair in both)
+        before, after = (f"{say_parting(pair)} {_scores(pair, metrics)}" for pair in both.values())
         rest = "This is one episode; the order of the agents counts every start, under other seeds."
         captions = f"{first} {before}", f"The same start and seed in the extended proxy. {after} {rest}"
-        for name, pair, caption in zip(BothEpisodes._fields, both, captions, strict=True):
+        for (name, pair), caption in zip(both.items(), captions, strict=True):
             drawn = episode_figure(pair, metrics)
             save_figure(drawn, path.with_name(f"{name}.png"))
             write_text(path.with_name(f"{name}.svg"), svg_of(drawn).decode("utf-8"))
@@ -116,8 +109,8 @@ def _text(value: object) -> str:
     return value
 
 
-def drive_both(closed: Closed, agent: str) -> BothEpisodes | None:
-    """Drive an agent from the start in which the proxy before is furthest from the target; None without a twin."""
+def drive_both(closed: Closed, agent: str) -> dict[str, SideBySide] | None:
+    """Drive an agent before and after, from the start in which it is furthest off before; None without a twin."""
     loop = closed.loop
     if loop.twin is None or closed.after is None or not can_record(loop.family):
         return None
@@ -127,7 +120,7 @@ def drive_both(closed: Closed, agent: str) -> BothEpisodes | None:
         return None
     start = max(known, key=mean_gap_m).episode.start
     before, after = (_drive(report, twin, agent, start, filmed=True) for report in (closed.before, closed.after))
-    return BothEpisodes(before, after) if before and after else None
+    return {"before": before, "after": after} if before and after else None
 
 
 def mean_gap_m(pair: SideBySide) -> float:

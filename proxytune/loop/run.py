@@ -205,7 +205,7 @@ class LoopReport(report.Shown):
 
     def figures(self) -> dict[str, Figure]:
         """PRPV before and after, by name."""
-        return {"prpv": _prpv_figure(rows_of(self.closed))}
+        return {"prpv": comparison.prpv_figure(rows_of(self.closed))}
 
     def table(self) -> pd.DataFrame:
         """One row per measure: before, after; then noise floor and a random ranking."""
@@ -304,7 +304,7 @@ def view_of(closed: Closed) -> report.View:
     rows = rows_of(closed)
     home, shown = closed.loop.home, []
     if closed.after:
-        shown = [report.picture_of("loop", "prpv", _prpv_figure(rows)), *read_pictures(home)]
+        shown = [report.picture_of("loop", "prpv", comparison.prpv_figure(rows)), *read_pictures(home)]
     found = (closed.diagnosis["effects"], (closed.diagnosis["camera"] or {}).get("effects"))
     for name in report.CAPTIONS["loop"]:
         # Of the camera there is a figure where it lacked nothing too
@@ -332,10 +332,6 @@ def view_of(closed: Closed) -> report.View:
             report.Paragraphs("Pages and files", (" · ".join(links),)),
         ),
     )
-
-
-def _prpv_figure(rows: list[comparison.Compared]) -> Figure:
-    return comparison.prpv_figure([row for row in rows if row.key in ("prpv", "held_out")])
 
 
 def _table(closed: Closed, rows: list[comparison.Compared]) -> report.Table:

@@ -74,11 +74,7 @@ def bank_text(bank: Bank, files: Mapping[str, Any]) -> Group:
 
 
 def write_bank_page(bank: Bank, table: Path) -> Path:
-    """Write the page beside the table of trials; its path.
-
-    Raises:
-        RunError: If it cannot be written.
-    """
+    """Write the page beside the table of trials; its path."""
     page = table.with_name("report.html")
     learn = f'Measure these agents on the target and write `learn_from = ["{table.parent.name}"]` into its study.toml.'
     title = f"{bank.settings.name}: what can a target learn from this bank?"

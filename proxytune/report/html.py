@@ -32,11 +32,7 @@ STYLE = fill("page.css")
 
 
 def write_page(path: Path, view: View, foot: Foot, renew_s: int = 0) -> None:
-    """Write a view as a page, which loads itself again so often while the work is under way [s]; 0 once it has ended.
-
-    Raises:
-        RunError: If it cannot be written.
-    """
+    """Write a view as a page; while the work is under way it loads itself again so often [s], 0 once it has ended."""
     write_text(path, page_html(view, foot, renew_s))
 
 

@@ -75,11 +75,7 @@ def plv_text(study: teaching.PlvStudy, files: Mapping[str, Any]) -> Group:
 
 
 def write_plv_report(study: teaching.PlvStudy, folder: Path) -> tuple[Path, Path]:
-    """Draw PLV of every trial, and write the page; the paths of both.
-
-    Raises:
-        RunError: If a file cannot be written.
-    """
+    """Draw PLV of every trial, and write the page; the paths of both."""
     figure, page = folder / "figures" / "plv.png", folder / "report.html"
     drawn = plv_figure(study)
     save_figure(drawn, figure)

@@ -7,10 +7,11 @@ from typing import Any
 from matplotlib.figure import Figure
 from rich.console import Group
 
+from proxytune.files import csv_text
 from proxytune.report import decision
 from proxytune.report.html import write_page
 from proxytune.report.score_figures import MOST, flipped_pairs_figure, scatter_figure
-from proxytune.report.text import Cell, csv_text, group_texts, latex_text, note_texts, table_text
+from proxytune.report.text import Cell, group_texts, latex_text, note_texts, table_text
 from proxytune.report.view import Column, Foot, Paragraphs, Picture, Table, View, columns_of
 from proxytune.report.wording import listed, short, short_span, with_span
 from proxytune.report.writing import file_names, picture_of, save_figures, write_text
@@ -135,11 +136,7 @@ def _all_drawn(assessments: Assessments, selection: Selection | None) -> Iterato
 def write_score_report(
     assessments: Assessments, selection: Selection | None, folder: Path, foot: Foot, *, target: str
 ) -> tuple[list[Path], Path]:
-    """Draw the figures of every proxy, and write the page; the paths of both.
-
-    Raises:
-        RunError: If a file cannot be written.
-    """
+    """Draw the figures of every proxy, and write the page; the paths of both."""
     drawn, page = list(_all_drawn(assessments, selection)), folder / "report.html"
     paths = save_figures({file: figure for file, figure, _ in drawn}, folder)
     view = score_view(assessments, selection, [picture for *_, picture in drawn], target=target)
@@ -226,11 +223,7 @@ def _number(value: float | None) -> str:
 
 
 def write_score_table(assessments: Assessments, path: Path) -> None:
-    """Write every measure of every proxy: as CSV a row for each, as LaTeX a row per measure and a column per proxy.
-
-    Raises:
-        RunError: If it cannot be written.
-    """
+    """Write every measure of every proxy: as CSV a row for each, as LaTeX a row per measure and a column per proxy."""
     rows, cells = list[Sequence[Cell]](), dict[str, list[str]]()
     for name, assessment in assessments.items():
         for measure, (metric, found) in ((one, own) for one in MEASURES for own in one.measured(assessment).items()):

@@ -15,11 +15,12 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from rich.console import Group, RenderableType
 
+from proxytune.files import csv_text
 from proxytune.report import figure_style as style
 from proxytune.report.html import write_page
 from proxytune.report.scores import score_document
 from proxytune.report.study.page import study_foot
-from proxytune.report.text import Cell, csv_text, group_texts, table_text
+from proxytune.report.text import Cell, group_texts, table_text
 from proxytune.report.view import Drawn, Paragraphs, Part, Table, View, columns_of
 from proxytune.report.wording import listed, plain, short, with_unit
 from proxytune.report.writing import picture_of, write_text
@@ -81,9 +82,9 @@ def curve_csv(curve: SweepCurve) -> str:
     series = series_of(curve)
     keys = [key for one in series for key in (one.key, f"{one.key}_low", f"{one.key}_high")]
     rows: list[list[Cell]] = []
-    for row, point in enumerate(curve.points):
-        found = [one.estimates[row] for one in series]
-        cells = [cell for one in found for cell in (one.score, *(one.interval or (None, None)))]
+    for point in curve.points:
+        found = [one.estimates[point.value] for one in series]
+        cells = [cell for one in found for cell in (one.value, *(one.interval or (None, None)))]
         rows.append([point.value, *cells, len(point.evaluation.failures)])
     return csv_text([curve.parameter, *keys, "failed_episodes"], rows)
 
@@ -105,10 +106,8 @@ def curve_tables(curve: SweepCurve) -> tuple[Table, Table]:
     """The scores by value: the paper's measures, with what they show, then the others; intervals are in the files."""
     series = series_of(curve)
     sides = [one for one in series if one.measure.in_paper], [one for one in series if not one.measure.in_paper]
-    rows = [
-        [(f"{point.value:.4g}", *(_cell(one, row) for one in own)) for row, point in enumerate(curve.points)]
-        for own in sides
-    ]
+    values = [point.value for point in curve.points]
+    rows = [[(f"{value:.4g}", *(_cell(one, value) for one in own)) for value in values] for own in sides]
     # Metrics stand on lines of their own, so that many columns fit.
     heads = [[one.name.replace(" ", "\n").replace("_", "\n") for one in own] for own in sides]
     columns = [columns_of((), (curve.label, *own)) for own in heads]
@@ -158,12 +157,12 @@ def _point_document(point: SweepPoint) -> dict[str, Any]:
     }
 
 
-def _cell(series: Series, row: int) -> str:
+def _cell(series: Series, value: float) -> str:
     """The score, PRPV with its interval."""
-    one = series.estimates[row]
-    if one.score is None:
+    one = series.estimates[value]
+    if one.value is None:
         return "failed" if series.measure is PRPV else ""
-    text = format(one.score, series.measure.digits)
+    text = format(one.value, series.measure.digits)
     if series.measure is not PRPV or one.interval is None:
         return text
     return f"{text} ({one.interval[0]:.0f} to {one.interval[1]:.0f})"
@@ -396,13 +395,12 @@ WIDEST = 20
 
 def draw_series(axes: Axes, series: Series, colour: str, marker: str, label: str = "", band: str = "") -> None:
     """A line through the scores, with its band of 95 % intervals, and names of both for a legend."""
-    known = [(one.value, one.score) for one in series.estimates if one.score is not None]
-    banded = [(one.value, *one.interval) for one in series.estimates if one.interval]
+    known = {value: one.value for value, one in series.estimates.items() if one.value is not None}
+    banded = [(value, *one.interval) for value, one in series.estimates.items() if one.interval]
     if banded:
         places, lows, highs = np.array(banded).T
         axes.fill_between(places, lows, highs, color=colour, alpha=0.18, linewidth=0, label=band)
-    values, scores = [value for value, _ in known], [score for _, score in known]
-    axes.plot(values, scores, marker=marker, color=colour, ms=3, lw=1.2, label=label)
+    axes.plot(list(known), list(known.values()), marker=marker, color=colour, ms=3, lw=1.2, label=label)
 
 
 def draw_prpv_and_ppv(prpv: Axes, ppv: Axes, curve: SweepCurve) -> None:

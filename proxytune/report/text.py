@@ -1,7 +1,6 @@
 """Views on the terminal, tables without lines with their headings and notes; and tables as files, CSV and LaTeX."""
 
-import csv
-import io
+import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -81,48 +80,16 @@ def group_texts(*parts: RenderableType) -> Group:
 
 
 ENDINGS = (".csv", ".tex")
-GREEK = ("alpha", "beta", "delta", "theta", "lambda", "mu", "rho", "sigma", "tau", "varphi", "omega", "Theta")
-IN_LATEX = {
-    "\\": r"\textbackslash{}",
-    **{character: f"\\{character}" for character in "&%$#_{}"},
-    "~": r"\textasciitilde{}",
-    "^": r"\textasciicircum{}",
-    "<": "$<$",
-    ">": "$>$",
-    "−": "$-$",
-    "–": "--",
-    "…": r"\ldots{}",
-    "’": "'",
-    "°": r"$^\circ$",
-    "²": "$^2$",
-    "±": r"$\pm$",
-    "×": r"$\times$",
-    "·": r"$\cdot$",
-    "≤": r"$\leq$",
-    "≥": r"$\geq$",
-    "→": r"$\rightarrow$",
-    "∞": r"$\infty$",
-    **{letter: f"$\\{name}$" for letter, name in zip("αβδθλμρστφωΘ", GREEK, strict=True)},
-}
-"""Characters that pdflatex would take for a command, or has no glyph for; accented letters it reads as they are."""
+IN_LATEX: dict[str, str] = tomllib.loads(
+    (Path(__file__).parent / "templates" / "latex.toml").read_text(encoding="utf-8")
+)
 Cell = str | float | None
 
 
 def check_table_file(option: str, path: Path) -> None:
-    """Refuse a file of another kind before anything is worked out.
-
-    Raises:
-        InputError: If its name ends otherwise.
-    """
+    """Refuse a file of another kind before anything is worked out."""
     if path.suffix not in ENDINGS:
         raise InputError(f"{option} {path}: a table is written as {' or '.join(ENDINGS)}; name the file so")
-
-
-def csv_text(columns: Sequence[str], rows: Sequence[Sequence[Cell]]) -> str:
-    """A table as CSV; cells without a value are empty."""
-    text = io.StringIO()
-    csv.writer(text, lineterminator="\n").writerows([columns, *rows])
-    return text.getvalue()
 
 
 def latex_text(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

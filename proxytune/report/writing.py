@@ -48,31 +48,19 @@ def figures_also_as(formats: Sequence[str]) -> Iterator[None]:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a text file, its folder made where missing; an interrupted write leaves the old file.
-
-    Raises:
-        RunError: If the file cannot be written.
-    """
+    """Write a text file, its folder made where missing; an interrupted write leaves the old file."""
     write_whole(path, "", lambda draft: draft.write_text(text, encoding="utf-8", newline="\n"))
 
 
 def save_figure(figure: Figure, path: Path) -> None:
-    """Write a figure as PNG, and in the formats of `figures_also_as`; an interrupted write leaves the old file.
-
-    Raises:
-        RunError: If the figure cannot be written.
-    """
+    """Write a figure as PNG, and in the formats of `figures_also_as`; an interrupted write leaves the old file."""
     write_whole(path, "the figure ", lambda draft: _save_as(figure, draft, format="png", dpi=200))
     for form in _beside.get():
         write_whole(path.with_suffix(f".{form}"), "the figure ", partial(_draw, figure, form))
 
 
 def save_figures(figures: Mapping[str, Figure], folder: Path) -> list[Path]:
-    """Write figures as `save_figure` does, NAME.png each; their paths.
-
-    Raises:
-        RunError: If one cannot be written.
-    """
+    """Write figures as `save_figure` does, NAME.png each; their paths."""
     for name, figure in figures.items():
         save_figure(figure, folder / f"{name}.png")
     return [folder / f"{name}.png" for name in figures]
@@ -160,11 +148,7 @@ def file_names(names: Iterable[str]) -> dict[str, str]:
 
 
 def write_picture(path: Path, picture: NDArray[np.uint8]) -> None:
-    """Write a picture (rows, columns, 3) as PNG, its folder made where missing; an interrupted write leaves the old.
-
-    Raises:
-        RunError: If the file cannot be written.
-    """
+    """Write a picture (rows, columns, 3) as PNG, its folder made where missing; an interrupted write leaves the old."""
     write_whole(path, "the picture ", lambda draft: Image.fromarray(picture).save(draft, format="png"))
 
 
@@ -172,9 +156,6 @@ def write_whole(path: Path, what: str, write: Callable[[Path], object]) -> None:
     """Have a draft written, its folder made where missing, and put it in the file's place once it is whole.
 
     A complaint has `what` it is, with a space at its end, after the path.
-
-    Raises:
-        RunError: If it cannot be written.
     """
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -1,4 +1,7 @@
-"""Score tables: how well each agent did, episode by episode, and the metrics that judge it."""
+"""Score tables: how well each agent did, episode by episode, and the metrics that judge it.
+
+Whatever reads or writes here raises ScoresError, in one line with file, line and column.
+"""
 
 import lazy_loader
 

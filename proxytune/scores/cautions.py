@@ -113,11 +113,8 @@ def _lengths(proxy: ScoreTable, target: ScoreTable, metrics: Sequence[Metric]) -
         ended = int((times >= longest - 1e-3 * abs(longest)).sum())
         shorter = ended >= max(FEWEST_AT_CEILING, CEILING * len(times))
         factor = max(most, other) / min(most, other) if min(most, other) > 0.0 else 1.0
-        if (
-            shorter
-            and factor > SAME_LENGTH
-            and not any(abs(factor / unit - 1.0) < 0.02 for unit in (60.0, 1e3, 1e6, 1e9))
-        ):
+        other_unit = any(abs(factor / unit - 1.0) < 0.02 for unit in (60.0, 1e3, 1e6, 1e9))
+        if shorter and factor > SAME_LENGTH and not other_unit:
             yield (
                 f"episodes last up to {most:.4g} in the proxy and up to {other:.4g} on the target by {metric.name}; "
                 "give both sides one time limit, or scores that grow with time cannot be compared"

@@ -177,14 +177,11 @@ def both_metrics(header: Sequence[str]) -> list[str]:
     return [name for name, known in sides.items() if len(known) == 2]
 
 
-def beside(metric: str, own: str, header: Sequence[str], side: Side | None) -> tuple[str | None, str | None]:
+def beside(metric: str, header: Sequence[str], side: Side | None) -> tuple[str | None, str | None]:
     """The columns of rollouts and of standard errors that belong to a metric, where there are some."""
-    counts = next((one for word in COUNTS if (one := own_column(word, header, side)) is not None), None)
-    plain = _plain(metric)[0]
-    names = [f"{plain} {word}" for word in ERRORS]
-    return (None if counts == own else counts), next(
-        (one for name in names if (one := own_column(name, header, side)) is not None), None
-    )
+    names = COUNTS, [f"{_plain(metric)[0]} {word}" for word in ERRORS]
+    counts, errors = (next(filter(None, (own_column(name, header, side) for name in some)), None) for some in names)
+    return (None if counts == metric else counts), errors
 
 
 Read = tuple[float, float | None, tuple[int, int] | None]
@@ -232,11 +229,7 @@ def expand(metrics: Sequence[str], header: Sequence[str]) -> list[str]:
 
 
 def check_sides(where: str, header: Sequence[str], metrics: Sequence[str]) -> None:
-    """Refuse to compare a column of a table with itself.
-
-    Raises:
-        ScoresError: If both sides would take the same column.
-    """
+    """Refuse to compare a column of a table with itself."""
     for name in metrics:
         own = {own_column(name, header, side) for side in ("proxy", "target")}
         if len(own) == 1 and None not in own:

@@ -16,10 +16,10 @@ import numpy as np
 
 from proxytune.arrays import Floats
 from proxytune.errors import ScoresError
-from proxytune.files import draft_of
+from proxytune.files import csv_text, draft_of
 from proxytune.scores import forms
 from proxytune.scores.table import LARGEST, ScoreTable
-from proxytune.settings import nearest, read_text
+from proxytune.settings import NO_CSV, nearest, table_text
 
 SEPARATORS = (",", ";", "\t")
 Columns = Mapping[str, str]
@@ -82,16 +82,7 @@ def read_cells(
     that is not there under the name that it is given may have its name from here. `side` is whose columns to take where
     a table has both sides', `part` the dictionary in a Python file.
     """
-    separator = ","
-    rows: Iterator[tuple[int, list[str]]]
-    if forms.is_form(path):
-        named, given = forms.form_rows(path, part)
-        rows = iter(given)
-    else:
-        text = _text(path)
-        separator = _separator(text)
-        rows = _rows(path, text, separator)
-        named = _first(path, rows)
+    named, rows, separator = _opened(path, part)
     ours = {theirs: name for name, theirs in (columns or {}).items() if theirs in named}
     alias = forms.agent_column(named)
     if alias is not None and "agent" not in {*named, *(columns or {})}:
@@ -103,7 +94,7 @@ def read_cells(
     if len(bare) == len(whose):
         header = [bare.get(name, name) for name in header]
     _check_header(path, header, metrics)
-    more = {name: forms.beside(name, name, header, side) for name in metrics}
+    more = {name: forms.beside(name, header, side) for name in metrics}
     wanted = {*forms.LABELS, *metrics, *(column for pair in more.values() for column in pair if column is not None)}
     lines, cells = _columns(path, rows, header, wanted)
     if forms.is_form(path):  # an agent that a dictionary does not have is left out
@@ -189,35 +180,26 @@ def _number(text: str) -> float:
 
 
 def column_names(path: Path, part: str | None = None) -> list[str]:
-    """The columns of a file, as its first line names them.
+    """The columns of a file, as its first line names them."""
+    return _opened(path, part)[0]
 
-    Raises:
-        ScoresError: If it cannot be read.
-    """
+
+def _opened(path: Path, part: str | None) -> tuple[list[str], Iterator[forms.Line], str]:
+    """The columns that a file's first line names, its rows, and what separates columns: a comma if nothing does."""
     if forms.is_form(path):
-        return forms.form_rows(path, part)[0]
-    text = _text(path)
-    return _first(path, _rows(path, text, _separator(text)))
-
-
-def _text(path: Path) -> str:
-    try:
-        return read_text(path, "utf-8-sig")
-    except FileNotFoundError:
-        raise ScoresError(f"{path}: no such file; check the path") from None
-    except OSError as problem:
-        raise ScoresError(f"{path}: cannot be read ({problem.strerror})") from None
-    except UnicodeDecodeError:
-        raise _no_csv(path) from None
-
-
-def _separator(text: str) -> str:
-    """The separator of the columns that the first line names; a comma where there is none."""
+        named, lines = forms.form_rows(path, part)
+        return named, iter(lines), ","
+    text = table_text(path, ScoresError)
     first = next((line for line in text.splitlines() if line.strip()), "")
-    return max(SEPARATORS, key=first.count)
+    separator = max(SEPARATORS, key=first.count)
+    rows = _rows(path, text, separator)
+    _, names = next(rows, (0, []))
+    if not names:
+        raise ScoresError(f"{path}: is empty; its first line must name the columns, agent and metrics among them")
+    return [cell.strip() for cell in names], rows, separator
 
 
-def _rows(path: Path, text: str, separator: str) -> Iterator[tuple[int, list[str]]]:
+def _rows(path: Path, text: str, separator: str) -> Iterator[forms.Line]:
     """Line number and cells of each line that is not empty."""
     lines = io.TextIOWrapper(io.BytesIO(text.encode()), encoding="utf-8", newline="")
     reader = csv.reader(lines, strict=True, delimiter=separator)
@@ -226,19 +208,11 @@ def _rows(path: Path, text: str, separator: str) -> Iterator[tuple[int, list[str
             if cells:
                 yield reader.line_num, cells
     except csv.Error:
-        raise _no_csv(path) from None
-
-
-def _first(path: Path, rows: Iterator[tuple[int, list[str]]]) -> list[str]:
-    """The names in the first line."""
-    _, cells = next(rows, (0, []))
-    if not cells:
-        raise ScoresError(f"{path}: is empty; its first line must name the columns, agent and metrics among them")
-    return [cell.strip() for cell in cells]
+        raise ScoresError(f"{path}: {NO_CSV}") from None
 
 
 def _columns(
-    path: Path, rows: Iterable[tuple[int, list[str]]], header: Sequence[str], names: Collection[str]
+    path: Path, rows: Iterable[forms.Line], header: Sequence[str], names: Collection[str]
 ) -> tuple[list[int], dict[str, list[str]]]:
     """Line numbers, and the cells of the columns of these names."""
     places = {name: header.index(name) for name in names if name in header}
@@ -252,10 +226,6 @@ def _columns(
         for name, place in places.items():
             cells[name].append(row[place].strip())
     return lines, cells
-
-
-def _no_csv(path: Path) -> ScoresError:
-    return ScoresError(f"{path}: is not a CSV file; save it as comma-separated text (UTF-8)")
 
 
 def _check_header(path: Path, header: Sequence[str], metrics: Sequence[str]) -> None:
@@ -336,11 +306,7 @@ def read_domains(
     side: forms.Side | None = None,
     part: str | None = None,
 ) -> dict[str, ScoreTable]:
-    """Read every domain of a CSV file or of several, in their order; without a domain column the only one is "".
-
-    Raises:
-        ScoresError: As in read_scores.
-    """
+    """Read every domain of a CSV file or of several, in their order; without a domain column the only one is ""."""
     names = tuple(metrics)
     files = [read_cells(file, names, columns, side, part) for file in _files(path)]
     for label, cells in [(label, cells) for label in forms.LABELS for cells in files]:
@@ -379,8 +345,6 @@ def _files(path: Files) -> list[Path]:
 
 def _check_single(files: Sequence[Cells], rows: Sequence[Row]) -> None:
     """Refuse an episode that one agent drove twice in one domain."""
-    if len(set(rows)) == len(rows):
-        return
     known: dict[Row, Path] = {}
     places = ((cells, line) for cells in files for line in cells.lines)
     for (cells, line), row in zip(places, rows, strict=True):
@@ -397,20 +361,11 @@ def _check_single(files: Sequence[Cells], rows: Sequence[Row]) -> None:
 
 
 def write_scores(table: ScoreTable, path: Path) -> None:
-    """Write a table as CSV, the same bytes for the same table; an interrupted write leaves the old file.
-
-    Raises:
-        ScoresError: If the file cannot be written.
-    """
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(["agent", "episode", *table.metrics])
-    for row, agent in enumerate(table.agents):
-        for column, episode in enumerate(table.episodes):
-            if table.driven[row, column]:
-                writer.writerow([agent, episode, *(repr(float(value)) for value in table.values[row, column])])
+    """Write a table as CSV, the same bytes for the same table; an interrupted write leaves the old file."""
+    driven = np.argwhere(table.driven)
+    rows = ([table.agents[row], table.episodes[at], *map(repr, table.values[row, at].tolist())] for row, at in driven)
     try:
         with draft_of(path) as draft:
-            draft.write_text(text.getvalue(), encoding="utf-8", newline="")
+            draft.write_text(csv_text(["agent", "episode", *table.metrics], rows), encoding="utf-8", newline="")
     except OSError as problem:
         raise ScoresError(f"{path}: cannot be written ({problem.strerror})") from None

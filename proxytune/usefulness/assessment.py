@@ -20,17 +20,7 @@ from proxytune.errors import ScoresError
 from proxytune.scores import Metric, ScoreTable, score_cautions
 from proxytune.usefulness import resampling
 from proxytune.usefulness.comparison import Comparison, compare, repeats
-from proxytune.usefulness.decision import (
-    ASKED,
-    Asked,
-    Decision,
-    Difference,
-    Together,
-    chosen,
-    compare_choices,
-    compare_savings,
-    decide,
-)
+from proxytune.usefulness.decision import ASKED, Asked, Decision, Difference, Together, chosen, compare_all, decide
 from proxytune.usefulness.noise import Chance, NoiseFloor, SuccessRates, chance, noise_floor, success_rates
 from proxytune.usefulness.pairs import Prpv, prpv, prpv_of_means
 from proxytune.usefulness.predictivity import Correlation, Mmrv, Ppv, kendall_tau, mmrv, ppv, srcc
@@ -257,11 +247,7 @@ def assess_each(
     resamples: int = 1000,
     seed: int = 0,
 ) -> tuple[dict[str, Assessment], Selection | None]:
-    """Assess proxies of one target by name, and rank them where there are several.
-
-    Raises:
-        ScoresError, InputError: As in assess.
-    """
+    """Assess proxies of one target by name, and rank them where there are several."""
     found = {
         name: assess(proxy=one, target=target, metrics=metrics, beta=beta, asked=asked, resamples=resamples, seed=seed)
         for name, one in proxies.items()
@@ -269,15 +255,9 @@ def assess_each(
     if len(found) == 1:
         return found, None
     inputs, saves = {name: one.inputs for name, one in found.items()}, {name: one.saves for name, one in found.items()}
-    # The target rectified by the two proxies that save most
-    names = sorted(saves, key=lambda name: -(saves[name].real_rollouts_worth or 0.0))[:2]
-    one, other = (inputs[name] for name in names)
-    both = saving_of(one, chosen(one, asked.decide_on)[0][0], other)
-    return found, replace(
-        select_proxy(proxies=proxies, target=target, metrics=metrics, resamples=resamples, seed=seed),
-        choices=(*compare_choices(inputs, asked, seed), *compare_savings(saves)),
-        together=Together((names[0], names[1]), both, decide(one, asked, both, seed)),
-    )
+    choices, together = compare_all(inputs, saves, asked, seed)
+    selection = select_proxy(proxies=proxies, target=target, metrics=metrics, resamples=resamples, seed=seed)
+    return found, replace(selection, choices=choices, together=together)
 
 
 def select_proxy(
@@ -292,9 +272,6 @@ def select_proxy(
 
     All proxies meet the same resampled target. The intervals are simultaneous: their width is set by the largest
     studentised deviation among all differences, so that looking at many pairs makes no false find more likely.
-
-    Raises:
-        ScoresError: If there is no proxy, or as in prpv.
     """
     if not proxies:
         raise ScoresError("no proxy is given; name at least one")

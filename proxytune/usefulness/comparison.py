@@ -79,11 +79,7 @@ def compare(*, proxy: ScoreTable, target: ScoreTable, metrics: Sequence[Metric])
 
 
 def in_common(tables: Mapping[str, ScoreTable]) -> tuple[dict[str, ScoreTable], tuple[str, ...]]:
-    """The tables with only those agents that all have, in each its own order, and who is left out, in a line each.
-
-    Raises:
-        ScoresError: If they have fewer than two in common.
-    """
+    """The tables with only those agents that all have, in each its own order, and who is left out, in a line each."""
     shared = set.intersection(*(set(table.agents) for table in tables.values()))
     lines = [
         f"left out, since not all sides have them: {', '.join(sorted(beyond))} of {name}"

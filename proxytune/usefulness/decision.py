@@ -22,7 +22,7 @@ from proxytune.scores import ROUNDING, ScoreTable
 from proxytune.settings import nearest
 from proxytune.usefulness.comparison import Comparison, by_start, start_of
 from proxytune.usefulness.resampling import CONFIDENCE, Ends, interval
-from proxytune.usefulness.saving import Saving, effective, is_rate, rate_intervals
+from proxytune.usefulness.saving import Saving, effective, is_rate, rate_intervals, saving_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -159,9 +159,6 @@ def decide(inputs: Comparison, asked: Asked, saving: Saving | None = None, seed:
     """Say which agent to deploy.
 
     What the proxy adds to the target's means where starts are paired (`saving`) counts where that is beyond noise.
-
-    Raises:
-        InputError: If the metric to choose by is not there.
     """
     columns, chosen_on = chosen(inputs, asked.decide_on)
     signs = np.array([1.0 if inputs.metrics[column].direction == "max" else -1.0 for column in columns])
@@ -181,14 +178,15 @@ def decide(inputs: Comparison, asked: Asked, saving: Saving | None = None, seed:
     tasks = tuple(_part(agents, parts, each, [k]) for k in places)
     rest = [(out, [k for k in places if k != out]) for out in places]
     without = tuple(replace(_part(agents, parts, each, others), name=parts[out][0]) for out, others in rest)
+    regrets = sides[1].max() - sides[1]
+    bare = Decision(
+        winner=observed.target_winners[0], probability_best=None, regret_interval=None, best_probabilities=None,
+        expected_regret=dict(zip(agents, map(float, regrets), strict=True)),
+        not_told_apart=observed.target_winners[1:], chosen_on=chosen_on, observed=observed, tasks=tasks,
+        without=without, least_told=None, basis="", scores=None, draws=None, counts=(),
+    )  # fmt: skip
     if known is None:
-        regrets = sides[1].max() - sides[1]
-        return Decision(
-            winner=observed.target_winners[0], probability_best=None, regret_interval=None, best_probabilities=None,
-            expected_regret=dict(zip(agents, map(float, regrets), strict=True)),
-            not_told_apart=observed.target_winners[1:], chosen_on=chosen_on, observed=observed, tasks=tasks,
-            without=without, least_told=None, basis="", scores=None, draws=None, counts=(),
-        )  # fmt: skip
+        return bare
     every, counts, centre, basis = known
     draws = np.mean(every, axis=0)
     regret = draws.max(axis=1, keepdims=True) - draws
@@ -209,7 +207,8 @@ def decide(inputs: Comparison, asked: Asked, saving: Saving | None = None, seed:
         best_rival, settled = int(centre.argmax()), (middle <= 0.0) | (middle >= 1.0)
         reach = np.hypot(low_high[best_rival, 1] - centre[best_rival], centre - low_high[:, 0])
         most = np.where(settled | settled[best_rival], centre[best_rival] - centre + reach, 0.0)
-    return Decision(
+    return replace(
+        bare,
         winner=agents[place],
         probability_best=float(best[place]),
         expected_regret=dict(zip(agents, map(float, expected), strict=True)),
@@ -220,10 +219,6 @@ def decide(inputs: Comparison, asked: Asked, saving: Saving | None = None, seed:
         },
         best_probabilities=dict(zip(agents, map(float, best), strict=True)),
         not_told_apart=tuple(agents[row] for row in held if row != place),
-        chosen_on=chosen_on,
-        observed=observed,
-        tasks=tasks,
-        without=without,
         least_told=float(1.96 * np.sqrt(2.0) * np.median(spread)),
         basis=basis,
         scores={agent: (float(middle[row]), ends[row]) for row, agent in enumerate(agents)},
@@ -233,11 +228,7 @@ def decide(inputs: Comparison, asked: Asked, saving: Saving | None = None, seed:
 
 
 def chosen(inputs: Comparison, decide_on: str) -> tuple[list[int], str]:
-    """The metrics that a decision averages over, by column, and what that is called.
-
-    Raises:
-        InputError: If the metric is not there, or metrics of two directions were to be averaged.
-    """
+    """The metrics that a decision averages over, by column, and what that is called; two directions have no average."""
     names = [metric.name for metric in inputs.metrics]
     alike = len({metric.direction for metric in inputs.metrics}) == 1
     driven = np.concatenate([side.values[side.driven].ravel() for side in (inputs.proxy, inputs.target)])
@@ -438,6 +429,17 @@ class Together:
     proxies: tuple[str, str]
     saves: Saving
     decision: Decision
+
+
+def compare_all(
+    inputs: Mapping[str, Comparison], saves: Mapping[str, Saving], asked: Asked, seed: int = 0
+) -> tuple[tuple[Difference, ...], Together]:
+    """Every two proxies of a target, by what choosing by them gains and what they save; the two best savers at once."""
+    names = sorted(saves, key=lambda name: -(saves[name].real_rollouts_worth or 0.0))[:2]
+    one, other = (inputs[name] for name in names)
+    both = saving_of(one, chosen(one, asked.decide_on)[0][0], other)
+    together = Together((names[0], names[1]), both, decide(one, asked, both, seed))
+    return (*compare_choices(inputs, asked, seed), *compare_savings(saves)), together
 
 
 def mmrv_conventions(inputs: Comparison) -> dict[str, dict[str, float]]:

@@ -145,9 +145,6 @@ def expect(
     """What a proxy and a perfect one are expected to score against this target.
 
     The fresh tables, a repetition each, are of episodes that nothing was chosen by; metrics are in the donors' order.
-
-    Raises:
-        ScoresError: As in prpv.
     """
     rng, sides = np.random.default_rng(seed), [compare(proxy=one, target=target, metrics=metrics) for one in fresh]
     means, known = sides[0].target.means, len(donors.first) > 0

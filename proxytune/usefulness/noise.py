@@ -65,9 +65,6 @@ def noise_floor(*, target: ScoreTable, metrics: Sequence[Metric], splits: int = 
     Where every start has repeats (episodes labelled START/REPEAT), both sets hold the same starts, each with half of
     its repeats; so the floor is on the high side by what half as many repeats are noisier. Otherwise the sets are
     halves of the episodes, and with them of the starts. Where all agents drove the same episodes, all are split alike.
-
-    Raises:
-        ScoresError: If there are fewer than two agents or a metric is unknown.
     """
     chosen = compare(proxy=target, target=target, metrics=metrics).target
     reason = resampling.too_few(chosen, "on the target")
@@ -95,9 +92,6 @@ def floor_of_repeats(
     interval is a bootstrap over starts, which both measurements share, and all agents too where none is missing. It
     covers the mean PRPV of many such pairs, so like every bootstrap of PRPV it lies on the high side. Episodes are
     labelled START or START/REPEAT.
-
-    Raises:
-        ScoresError: As in prpv.
     """
     inputs = compare(proxy=again, target=domain, metrics=metrics)
     one, other = by_start(inputs.target), by_start(inputs.proxy)
@@ -105,13 +99,10 @@ def floor_of_repeats(
     one, other = (table.arrange(agents=inputs.agents, episodes=shared) for table in (one, other))
     both = (one.driven & other.driven)[..., None]
     one, other = (replace(table, values=np.where(both, table.values, np.nan)) for table in (one, other))
-    absent = [agent for agent, count in zip(one.agents, one.counts, strict=True) if not count]
-    reason = (
-        f"agent '{absent[0]}' drove no start both times"
-        if absent
-        else resampling.too_few(one, "from starts driven both times")
-    )
-    if reason:
+    absent = [
+        f"agent '{agent}' drove no start both times" for agent, n in zip(one.agents, one.counts, strict=True) if not n
+    ]
+    if reason := next(iter(absent), "") or resampling.too_few(one, "from starts driven both times"):
         return NoiseFloor("none", reason=reason)
     value = float(prpv_of_means(one.means, other.means, metrics))
     counts = resampling.draw_counts(one, np.random.default_rng(seed), resamples)

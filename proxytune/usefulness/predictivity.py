@@ -56,9 +56,6 @@ def ppv(inputs: Comparison, beta: Mapping[str, float] | None = None) -> Ppv:
     The definition taken: Σ_m β_m |M_m(proxy) − M_m(target)|, averaged over the agents. Without β each metric weighs
     one over its spread on the target (standard deviation of the agents' means), so that PPV counts standard deviations.
     Direction and tolerance of the metrics play no part.
-
-    Raises:
-        InputError: If a weight is missing, unknown, negative or not finite.
     """
     weights = weights_of_spread(inputs.target.means)
     if beta is not None:
@@ -178,9 +175,7 @@ def _correlation(name: str, values: Floats, inputs: Comparison) -> Correlation:
 def pod_of_poses(*, proxy: ArrayLike, target: ArrayLike) -> float:
     """Mean distance of places under the same commands [m], eq. (1) of the paper: ‖(Δx, Δy)‖₂ at each time.
 
-    Args:
-        proxy: Poses in the proxy, shape (…, time, 3): x [m], y [m], heading [rad].
-        target: Poses on the target at the same times, same shape.
+    Both sides have poses at the same times, (…, time, 3): x [m], y [m], heading [rad].
 
     Raises:
         InputError: If the shapes differ or are none of poses, or a value is missing.
@@ -196,12 +191,8 @@ def pod_of_images(*, proxy: ArrayLike, target: ArrayLike) -> float:
     """Mean difference of camera images under the same commands, eq. (1): root mean square over pixels at each time.
 
     That is the Euclidean norm of the paper divided by the square root of the number of pixels and channels, as a
-    fraction of full scale, so that it does not depend on the resolution.
-
-    Args:
-        proxy: Images in the proxy, shape (time, height, width) or (time, height, width, channels): whole numbers of
-            0 to 255 or fractions of 0 to 1.
-        target: Images on the target at the same times, same shape and type.
+    fraction of full scale, so that it does not depend on the resolution. Both sides have images at the same times,
+    (time, height, width) or with channels last: whole numbers of 0 to 255 or fractions of 0 to 1.
 
     Raises:
         InputError: If shapes or types differ or are none of images, or a value is missing or beyond full scale.

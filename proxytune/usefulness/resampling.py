@@ -49,11 +49,7 @@ class PrpvInterval:
 
 def why_not_repeated(inputs: Comparison) -> str:
     """The reason for which these tables bear no bootstrap, empty if they do."""
-    for name, table in (("in the proxy", inputs.proxy), ("on the target", inputs.target)):
-        reason = too_few(table, name)
-        if reason:
-            return reason
-    return ""
+    return too_few(inputs.proxy, "in the proxy") or too_few(inputs.target, "on the target")
 
 
 def too_few(table: ScoreTable, name: str) -> str:

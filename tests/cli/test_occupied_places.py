@@ -9,20 +9,20 @@ from several import make_several
 from tiny_loop import TWIN, write_tiny
 
 COMMANDS = {
-    "measure": ("measure tiny --model twin.toml --output there", "measure.measure"),
-    "predict": ("predict twin.toml log --output there", "predict.predict"),
-    "predict of pictures": ("predict twin.toml log --frames --output there", "predict.predict"),
-    "record": ("record tiny --model twin.toml --output there", "record.record_log"),
+    "measure": ("measure tiny --model twin.toml --output there", "tasks.api.measure"),
+    "predict": ("predict twin.toml log --output there", "tasks.api.predict"),
+    "predict of pictures": ("predict twin.toml log --frames --output there", "tasks.api.predict"),
+    "record": ("record tiny --model twin.toml --output there", "tasks.api.record_log"),
     "drive": ("drive tiny --agent steady --output there", "drive.study.drive_side_by_side"),
-    "export": ("export twin.toml --to filter --output there", "export.export"),
-    "import": ("import log there --robot nobodys", "importing.import_log"),
+    "export": ("export twin.toml --to filter --output there", "tasks.api.export"),
+    "import": ("import log there --robot nobodys", "tasks.api.import_log"),
     "score": ("score --proxy p.csv --target p.csv --metric d:max --output there", "score.usefulness.assess_each"),
     "score's table": (
         "score --proxy p.csv --target p.csv --metric d:max --table there",
         "score.usefulness.assess_each",
     ),
     "diagnose": ("diagnose log --output there", "diagnose.diagnose_log"),
-    "sweep": ("sweep tiny --parameter trim --output there", "sweep.run_sweep"),
+    "sweep": ("sweep tiny --parameter trim --output there", "tasks.api.run_sweep"),
 }
 TARGET = "agent,episode,distance,survival_time\n" + "".join(
     f"{agent},{start},{start},2\n" for agent in ("steady", "brisk", "daredevil") for start in (0, 1)
@@ -32,8 +32,8 @@ IN_STUDIES = {
     "study": ("study tiny", "study.run_opened", {"figures": "a file", "report.html": "a folder"}),
     "study of families": ("study several", "study.run_opened_families", {"figures": "a file"}),
     "study of a bank": ("study bank", "study.study.run_bank", {"bank.json": "a folder", "report.html": "a folder"}),
-    "sweep": ("sweep tiny --parameter trim", "sweep.run_sweep", {"figures": "a file"}),
-    "teach": ("teach tiny", "teach.teach", {"figures": "a file", "report.html": "a folder"}),
+    "sweep": ("sweep tiny --parameter trim", "tasks.api.run_sweep", {"figures": "a file"}),
+    "teach": ("teach tiny", "tasks.api.teach", {"figures": "a file", "report.html": "a folder"}),
     "loop": ("loop tiny", "loop.run_loop", {"loop/diagnosed": "a file", "loop/report.html": "a folder"}),
     "diagnose": ("diagnose log --output tiny", "diagnose.diagnose_log", {"model.toml": "a folder"}),
 }

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from one_line import complaint_of
 
-from proxytune.domain import BatchClassroom, Classroom, DomainFamily, OnPolicyClassroom, make_episode
+from proxytune.domain import Classroom, DomainFamily, OnPolicyClassroom, make_episode
 from proxytune.driving import TICK_HZ, Expert, LaneFollowing, drive, lane_following, read_robot, shipped_map
 from proxytune.driving.episode import Course, Sight, driving_score, start_pose
 from proxytune.driving.expert import MEMORY, Pupil
@@ -193,9 +193,9 @@ def parameters(method):
 
 
 def test_lane_following_has_every_member_of_a_classroom():
-    promised = (Classroom, OnPolicyClassroom, BatchClassroom, DomainFamily)
+    promised = (Classroom, OnPolicyClassroom, DomainFamily)
     members = {name: member for one in promised for name, member in vars(one).items() if not name.startswith("_")}
-    assert {"demonstrate", "guide", "examine", "examine_together", "best_score", "identity", "run"} <= set(members)
+    assert {"demonstrate", "guide", "examine", "best_score", "identity", "run"} <= set(members)
     for name, wanted in members.items():
         given = getattr(LaneFollowing, name)
         if isinstance(wanted, property):

@@ -37,7 +37,7 @@ def test_the_start_furthest_from_the_target_is_shown_and_nothing_without_a_twin_
     for start in range(4):
         episode = make_episode(THETA, agent="crawler", start=start, seed=episode_seed(study.settings.seed, start))
         gaps.append(mean_gap_m(drive_side_by_side(study.family, target, episode)))
-    before, after = drive_both(closed, "crawler")
+    before, after = drive_both(closed, "crawler").values()
     assert before.episode.start == after.episode.start == np.argmax(gaps)
     assert before.episode.seed == after.episode.seed
     assert np.array_equal(before.target.places, after.target.places)

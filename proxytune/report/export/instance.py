@@ -41,11 +41,7 @@ class Instance:
         return otherwise if found is None else float(getattr(found, parameter))
 
     def figure(self, name: str) -> float:
-        """A figure of the robot.
-
-        Raises:
-            InputError: If the robot does not state it.
-        """
+        """A figure that the robot states."""
         if name not in self.robot.figures:
             raise InputError(f"robot '{self.robot.name}' states no {name}; add it to its robot.toml")
         return self.robot.figures[name]

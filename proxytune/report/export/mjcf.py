@@ -25,9 +25,6 @@ def mjcf_text(instance: Instance) -> str:
     shows it. A car has one front wheel, in the middle, and an open differential.
 
     A delay needs a MuJoCo whose actuators have one (the attribute `delay`).
-
-    Raises:
-        InputError: If the robot states no mass or no wheel torque.
     """
     radius, mass, baseline = instance.figure("wheel_radius"), instance.figure("mass"), instance.baseline_m
     wheelbase = instance.figure("wheelbase") if instance.steers else 0.0

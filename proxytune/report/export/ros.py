@@ -17,106 +17,81 @@ from proxytune.report.writing import fill
 
 TIMEOUT_S = 0.5
 """diff_drive_controller's own default of cmd_vel_timeout; no effect says anything about it."""
-Rows = list[str]
 
 
 def ros_text(instance: Instance) -> str:
     """A parameter file for the robot's own controller: with it the robot goes as it is told.
 
     The multipliers are those of open-loop driving: a wheel that turns slower than told is treated as a smaller one.
-
-    Raises:
-        InputError: If the robot lacks a figure.
     """
-    lines = [f"# {line}" for line in header(instance, "ros")] + _controller(instance)
+    parts = [_car(instance) if instance.steers else _wheels(instance)]
     if (camera := instance.camera) is not None:
-        lines += _camera_info(camera)
-    for child, pose in instance.mounts.items():
-        lines += _transform(child, pose)
-    return "\n".join(lines) + "\n"
+        parts.append(_camera_info(camera))
+    parts += [_transform(child, pose) for child, pose in instance.mounts.items()]
+    return "".join([*(f"# {line}\n" for line in header(instance, "ros")), *parts])
 
 
-def _controller(instance: Instance) -> Rows:
-    """Parameters of ros2_controllers' diff_drive_controller, or of its ackermann_steering_controller."""
-    if instance.steers:  # Names of Jazzy and later; a car that drives slower than told has smaller wheels
-        return [
-            "ackermann_steering_controller:",
-            "  ros__parameters:",
-            '    traction_joints_names: ["axle_right", "axle_left"]',
-            '    steering_joints_names: ["steer_right", "steer_left"]',
-            f"    wheelbase: {_number(instance.figure('wheelbase'))}",
-            f"    traction_track_width: {_number(instance.baseline_m)}",
-            f"    traction_wheels_radius: {_number(instance.gains[0] * instance.figure('wheel_radius'))}",
-        ]
-    gains, baseline = instance.gains, instance.baseline_m
+def _car(instance: Instance) -> str:
+    """Parameters of ros2_controllers' ackermann_steering_controller, by the names of Jazzy and later."""
+    # A car that drives slower than told has smaller wheels
+    radius = instance.gains[0] * instance.figure("wheel_radius")
+    return _filled("ros_car", wheelbase=instance.figure("wheelbase"), track=instance.baseline_m, radius=radius)
+
+
+def _wheels(instance: Instance) -> str:
+    """Parameters of ros2_controllers' diff_drive_controller; accelerations only where the slew rate was found."""
+    gains, baseline, speed = instance.gains, instance.baseline_m, instance.figure("full_speed")
     built = instance.robot.figures.get("wheel_distance", instance.figure("effective_baseline"))
-    speed = instance.figure("full_speed")
     fastest = min(speed * gain * limit for gain, limit in zip(gains, instance.limits, strict=True))
     rise = instance.value("slew_rate", "rise_time", 0.0)
     # A duty rises at the same rate whatever it is cut off at.
     fastest_rise = speed * min(gains) / rise if rise else 0.0
-    return [
-        "diff_drive_controller:",
-        "  ros__parameters:",
-        '    left_wheel_names: ["axle_left"]',
-        '    right_wheel_names: ["axle_right"]',
-        f"    wheel_separation: {_number(built)}",
-        f"    wheel_separation_multiplier: {_number(baseline / built)}",
-        f"    wheel_radius: {_number(instance.figure('wheel_radius'))}",
-        f"    left_wheel_radius_multiplier: {_number(gains[0])}",
-        f"    right_wheel_radius_multiplier: {_number(gains[1])}",
-        f"    cmd_vel_timeout: {_number(TIMEOUT_S)}  # the controller's default: nothing was found of it",
-        *_limits("linear.x", fastest, fastest_rise),
-        *_limits("angular.z", 2.0 * fastest / baseline, 2.0 * fastest_rise / baseline),
-    ]
+    text = _filled(
+        "ros_wheels",
+        built=built,
+        wider=baseline / built,
+        radius=instance.figure("wheel_radius"),
+        left=gains[0],
+        right=gains[1],
+        timeout=TIMEOUT_S,
+        speed=fastest,
+        backwards=-fastest,
+        rise=fastest_rise,
+        turn=2.0 * fastest / baseline,
+        turn_right=-2.0 * fastest / baseline,
+        turn_rise=2.0 * fastest_rise / baseline,
+    )
+    return "".join(line for line in text.splitlines(keepends=True) if fastest_rise or "acceleration" not in line)
 
 
-def _limits(axis: str, velocity: float, acceleration: float) -> Rows:
-    rows = [f"    {axis}.max_velocity: {_number(velocity)}", f"    {axis}.min_velocity: {_number(-velocity)}"]
-    return rows + ([f"    {axis}.max_acceleration: {_number(acceleration)}"] if acceleration else [])
-
-
-def _camera_info(figures: CameraFigures) -> Rows:
+def _camera_info(figures: CameraFigures) -> str:
     """The intrinsics of sensor_msgs/CameraInfo, whose pixels have their middles at whole numbers."""
     focal = figures.rows / 2.0 / math.tan(math.radians(figures.field_of_view_deg) / 2.0)
-    across, right = focal * figures.aspect, figures.columns / 2.0 + figures.centre_right * figures.rows - 0.5
+    right = figures.columns / 2.0 + figures.centre_right * figures.rows - 0.5
     down = figures.rows / 2.0 + figures.centre_down * figures.rows - 0.5
-    k = (across, 0.0, right, 0.0, focal, down, 0.0, 0.0, 1.0)
-    p = (across, 0.0, right, 0.0, 0.0, focal, down, 0.0, 0.0, 0.0, 1.0, 0.0)
-    return [
-        f"camera:  # at {figures.columns} x {figures.rows} pixels; scale k and p to yours, for its camera_info_url",
-        "  ros__parameters:",
-        f"    camera_info.width: {figures.columns}",
-        f"    camera_info.height: {figures.rows}",
-        "    camera_info.distortion_model: plumb_bob",
-        f"    camera_info.d: {_list((figures.k1, 0.0, 0.0, 0.0, 0.0))}",
-        f"    camera_info.k: {_list(k)}",
-        f"    camera_info.p: {_list(p)}",
-    ]
+    size = {"columns": str(figures.columns), "rows": str(figures.rows)}
+    numbers = {"k1": figures.k1, "across": focal * figures.aspect, "right": right, "focal": focal, "down": down}
+    return _filled("ros_camera", **size, **numbers)
 
 
-def _transform(child: str, pose: Floats) -> Rows:
+def _transform(child: str, pose: Floats) -> str:
     """Parameters of tf2_ros' static_transform_publisher; base_link is the middle of the axle, on the floor."""
     # The quaternion of a rotation by less than half a turn
     turned = pose[:3, :3]
     w = math.sqrt(max(1e-12, 1.0 + float(np.trace(turned)))) / 2.0
     skew = turned - turned.T
-    quaternion = (*(float(skew[at]) / 4.0 / w for at in ((2, 1), (0, 2), (1, 0))), w)
-    rows = [f"{child}_transform:  # x forward, y left, z up, as base_link", "  ros__parameters:"]
-    rows += ["    frame_id: base_link", f"    child_frame_id: {child}"]
-    place = pose[:3, 3].tolist()
-    rows += [f"    translation.{axis}: {_number(value)}" for axis, value in zip("xyz", place, strict=True)]
-    return rows + [f"    rotation.{axis}: {_number(value)}" for axis, value in zip("xyzw", quaternion, strict=True)]
+    turn = (*(float(skew[at]) / 4.0 / w for at in ((2, 1), (0, 2), (1, 0))), w)
+    names = ("x", "y", "z", "qx", "qy", "qz", "qw")
+    return _filled("ros_transform", child=child, **dict(zip(names, (*pose[:3, 3].tolist(), *turn), strict=True)))
 
 
-def _number(value: float) -> str:
-    """With a point: ROS tells whole numbers from others."""
-    text = f"{round(value, 9) + 0.0:.9g}"
-    return text if "." in text or "e" in text else f"{text}.0"
-
-
-def _list(values: tuple[float, ...]) -> str:
-    return "[" + ", ".join(map(_number, values)) + "]"
+def _filled(template: str, **values: float | str) -> str:
+    """A template with numbers as ROS tells them from whole ones: with a point."""
+    said = {}
+    for name, value in values.items():
+        text = value if isinstance(value, str) else f"{round(value, 9) + 0.0:.9g}"
+        said[name] = text if isinstance(value, str) or "." in text or "e" in text else f"{text}.0"
+    return fill(f"{template}.yaml.txt", **said)
 
 
 RATE_HZ = 60.0

@@ -23,11 +23,7 @@ class Place(NamedTuple):
 
 
 class XmlPatch:
-    """A file's elements, and what is to be changed of them.
-
-    Raises:
-        InputError: If the file cannot be read or is no XML.
-    """
+    """A file's elements, and what is to be changed of them; one that cannot be read, or is no XML, is an InputError."""
 
     def __init__(self, path: Path) -> None:
         self.path = path

@@ -211,11 +211,7 @@ def trials_table(trials: Sequence[TrialRecord], names: Sequence[str], measures: 
 
 
 def write_study_tables(result: StudyResult, trials: pd.DataFrame, folder: Path) -> list[Path]:
-    """Write trials.csv, a row per trial, and as LaTeX parameters.tex and usefulness.tex; their paths.
-
-    Raises:
-        RunError: If one cannot be written.
-    """
+    """Write trials.csv, a row per trial, and as LaTeX parameters.tex and usefulness.tex; their paths."""
     texts = {"trials.csv": trials.to_csv(lineterminator="\n")}
     for name, table, width in (("parameters", theta_table(result), None), ("usefulness", usefulness_table(result), 3)):
         heads = [one.name for one in table.columns]
@@ -284,9 +280,6 @@ def write_live_page(
     """Write the page of a study that has not ended, which loads itself again while something is being done.
 
     The trials are those that have ended, in order; what is being done is "" once the study was stopped.
-
-    Raises:
-        RunError: If it cannot be written.
     """
     view = live_view(settings, objective, trials, doing)
     write_page(path, view, study_foot(settings), RENEW_S if doing else 0)

@@ -1,0 +1,163 @@
+"""Commands that are options, one function of `proxytune.api`, and text: a function for each."""
+
+import argparse
+
+from rich.console import Group
+from rich.text import Text
+
+from proxytune import api, report
+from proxytune.cli.options import check_made, facts_of, on_its_cluster, study_folder, typed, wanted_of
+from proxytune.cli.terminal import Answer, waiting
+from proxytune.errors import InputError
+from proxytune.files import check_place
+from proxytune.importing import Survey
+from proxytune.study import read_study_settings
+
+MOST_FRAMES = 1_000_000
+"""As many as six digits number."""
+MOST_REPEATS = 10_000
+"""Weeks of driving at the least."""
+
+
+@on_its_cluster
+def sweep(arguments: argparse.Namespace) -> Answer:
+    """`sweep`: simulate what is missing of usefulness along one parameter or each of a study's, and draw it."""
+    folder = study_folder(arguments.path)
+    check_made(folder) if arguments.output is None else check_place(arguments.output, folder=True)
+    chosen = {"points": arguments.points, "at": arguments.at, "target_model": arguments.target_model}
+    found = api.run_sweep(folder, arguments.parameter, progress=True, **chosen)
+    figures, files = found.write(arguments.output, typed(arguments))
+    document = found.document()
+    at = document.pop("at")
+    paths = {"figures": [str(path) for path in figures], "files": [str(path) for path in files]}
+    text = report.sweep_text(found.curves, found.episodes, [*figures, *files], found.held)
+    return Answer(document | paths | {"at": at}, text)
+
+
+@on_its_cluster
+def teach(arguments: argparse.Namespace) -> Answer:
+    """`teach`: run what is left of learning curves and PLV; what is finished is summed up without training."""
+    folder = study_folder(arguments.path)
+    check_made(folder)
+    found = api.teach(folder, progress=True)
+    figure, page = found.write(typed(arguments))
+    document = {**found.document(), "figure": str(figure), "report": str(page)}
+    return Answer(document, report.teach_text(found.experiment, found.prpv, {"figure": figure, "report": page}))
+
+
+def fleet(arguments: argparse.Namespace) -> Answer:
+    """`fleet`: tell θ of several robots of one kind, and p(θ) over them; nothing is simulated."""
+    if arguments.output:
+        check_place(arguments.output, folder=True)
+    with waiting("learning θ of each robot"):
+        found = api.fleet(study_folder(arguments.path), arguments.targets)
+    written = found.write(arguments.output, typed(arguments)) if arguments.output else ()
+    files = dict(zip(("figure", "report"), written, strict=False))
+    document = {**found.document(), **{name: str(path) for name, path in files.items()}}
+    return Answer(document, report.fleet_text(found.result, files))
+
+
+def measure(arguments: argparse.Namespace) -> Answer:
+    """`measure`: score a study's agents from every start in the domain of a model file, and write the table."""
+    if not arguments.output.absolute().parent.is_dir():
+        raise InputError(f"{arguments.output}: its folder does not exist; create it first")
+    check_place(arguments.output)
+    options = {"repeats": arguments.repeats, "seed": arguments.seed}
+    found = api.measure(arguments.path, arguments.model, progress=True, **options)
+    found.write(arguments.output)
+    document = {"scores": str(arguments.output), **found.document()}
+    lines = [*(f"beware: {line}" for line in found.cautions), f"seed {found.seed}", str(arguments.output)]
+    means = zip(found.scores.agents, found.scores.means, strict=True)
+    rows = tuple((str(agent), *(f"{value:.3f}" for value in own)) for agent, own in means)
+    heads = report.columns_of(("agent",), [report.plain(name) for name in found.scores.metrics])
+    table = report.Table("", heads, rows)
+    return Answer(document, Group(report.table_text(table), Text("\n".join(lines))))
+
+
+def record(arguments: argparse.Namespace) -> Answer:
+    """`record`: drive every manoeuvre, and lanes where pictures are wanted, and write the log."""
+    if not 1 <= arguments.repeats <= MOST_REPEATS or arguments.seed < 0 or not 5.0 <= arguments.seconds <= 600.0:
+        limits = f"--repeats must be between 1 and {MOST_REPEATS}, --seed at least 0 and --seconds between 5 and 600"
+        raise InputError(limits)
+    if not 0 <= arguments.frames <= MOST_FRAMES:
+        raise InputError(f"--frames must be between 0 and {MOST_FRAMES}, got {arguments.frames}")
+    settings = read_study_settings(arguments.path)
+    if not arguments.model.is_file():
+        raise InputError(f"--model {arguments.model}: no such file; check the path")
+    check_place(arguments.output, folder=True)
+    wanted = api.Wanted(arguments.repeats, arguments.seconds, arguments.frames, arguments.seed, arguments.commands)
+    with waiting("driving") as tell:
+        log, cautions = api.record_log(settings, arguments.model, arguments.output, wanted, tell)
+    rows, frames = sum(len(episode.times) for episode in log.episodes), arguments.frames
+    document = {"log": str(arguments.output), "episodes": len(log.episodes), "rows": rows, "frames": frames}
+    pictures = f", {frames} frames" if frames else ""
+    text = f"{len(log.episodes)} drives, {rows} rows{pictures}\n{arguments.output}"
+    lines = [*(f"beware: {line}" for line in cautions), text]
+    return Answer({**document, "seed": arguments.seed, "cautions": list(cautions)}, Text("\n".join(lines)))
+
+
+def take_in(arguments: argparse.Namespace) -> Answer:
+    """`import`: list what a bag, a table or a trajectory holds, and write the log."""
+    if arguments.output is not None:
+        check_place(arguments.output, folder=True)
+    wanted, facts = wanted_of(arguments), facts_of(arguments)
+    with waiting(f"reading {arguments.source}"):
+        found = api.import_log(arguments.source, arguments.output, wanted=wanted, facts=facts)
+    source, output = found.source, arguments.output
+    rows = tuple((one.name, one.kind, str(one.count), one.role) for one in source.channels)
+    columns = (report.Column("what"), report.Column("type"), *report.columns_of((), ("count",)))
+    channels = report.Table(source.form, (*columns, report.Column("taken for")), rows)
+    heads = report.columns_of(
+        ("drive",), ("time", "poses", "rate", "jitter", "lost", "gaps", "commands", "answers after")
+    )
+    drives = report.Table("Drives", heads, tuple(map(_drive_row, source.surveys)))
+    beware = (f"- beware: {line}" for line in found.cautions)
+    notes = Text("\n".join((*beware, *(f"- {note}" for note in source.notes))))
+    last = f"next: python -m proxytune diagnose {output}" if output else "give OUTPUT to write the log"
+    tables = report.table_text(channels), Text(), report.table_text(drives)
+    return Answer(found.document(), Group(*tables, Text(), notes, Text(last)))
+
+
+def _drive_row(one: Survey) -> tuple[str, ...]:
+    gaps = f"{one.gaps} to {one.longest_gap_s:.1f} s" if one.gaps else "none"
+    lag = "?" if one.lag_s is None else f"{one.lag_s:.2f} s"
+    numbers = (f"{one.seconds:.1f} s", str(one.poses), f"{one.poses_hz:.1f} Hz", f"{1e3 * one.jitter_s:.1f} ms")
+    return (one.name, *numbers, report.percent(one.lost), gaps, str(one.commands), lag)
+
+
+def predict(arguments: argparse.Namespace) -> Answer:
+    """`predict`: predict the poses of a log, or its pictures, by a model, and compare them with those measured."""
+    folder = arguments.output if arguments.frames else None
+    check_place(arguments.output, folder=arguments.frames)
+    chosen = {"horizon_s": arguments.horizon, "wanted": wanted_of(arguments), "facts": facts_of(arguments)}
+    with waiting("predicting") as tell:
+        found = api.predict(arguments.model, arguments.log, frames=folder, tell=tell, **chosen)
+    if isinstance(found, api.PicturePrediction):
+        return Answer(found.document(), Text(f"{found.sentence}\n{arguments.output}"))
+    report.write_text(arguments.output, found.poses.to_csv(index=False))
+    count = found.error.windows or len(found.poses.groupby(["episode", "start_time"]))
+    windows = f"{count} windows of {arguments.horizon:g} s"
+    document = {"predictions": str(arguments.output), **found.document()}
+    cautions = [f"beware: {line}" for line in found.cautions]
+    lines = [*cautions, *found.notes, f"{windows}: {found.sentence}", str(arguments.output)]
+    return Answer(document, Text("\n".join(lines)))
+
+
+def export(arguments: argparse.Namespace) -> Answer:
+    """`export`: write what was found for other simulators or robots, and say what went where and what has no place."""
+    check_place(arguments.output)
+    wheels, has = (tuple(filter(None, given.split(","))) for given in (arguments.wheels, arguments.has))
+    found = api.export(arguments.model, arguments.output, to=arguments.to, into=arguments.into, wheels=wheels, has=has)
+    cautions = (f"beware: {line}" for line in found.facts.get("cautions", ()))
+    lines = [*cautions, *map(str, found.lines), str(arguments.output)]
+    if arguments.to in api.TRIALS:
+        lines.insert(0, f"{found.facts['trials']} trials of '{found.facts['name']}'")
+    if arguments.to == "optuna":
+        lines.append(f"look: optuna-dashboard sqlite:///{arguments.output}")
+    said = Text("\n".join(lines))
+    if arguments.into is None:
+        return Answer(found.document(), said)
+    diff = found.facts["diff"] or f"{arguments.into}: nothing in it has to change\n"
+    rest = f"--to filter --has {','.join(report.IN_WHEELS)} --output cmd_vel_filter.py"
+    then = f"the filter for the rest: proxytune export {arguments.model} {rest}"
+    return Answer(found.document(), Group(Text(diff, no_wrap=True, overflow="ignore"), said, Text(then)))

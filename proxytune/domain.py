@@ -44,19 +44,12 @@ def make_episode(theta: Theta, *, agent: str, start: int, seed: int) -> Episode:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of one episode.
+    """What became of one episode."""
 
-    Attributes:
-        episode: Which one.
-        metrics: Its scores, None if it failed.
-        failure: Why it failed, empty if it did not.
-        seconds: How long it took.
-    """
-
-    episode: Episode
-    metrics: Mapping[str, float] | None
-    failure: str
-    seconds: float
+    episode: Episode  # which one
+    metrics: Mapping[str, float] | None  # its scores, None if it failed
+    failure: str  # why it failed, empty if it did not
+    seconds: float  # how long it took
 
 
 class DomainFamily(Protocol):
@@ -151,15 +144,10 @@ class Recorder(DomainFamily, Protocol):
 
 
 class Demonstration(NamedTuple):
-    """What an expert has shown: samples to imitate.
+    """What an expert has shown: samples to imitate."""
 
-    Attributes:
-        observations: What an agent would have seen before each command, (samples, …).
-        commands: What the expert would do, (samples, channels).
-    """
-
-    observations: NDArray[Any]
-    commands: NDArray[np.float64]
+    observations: NDArray[Any]  # what an agent would have seen before each command, (samples, …)
+    commands: NDArray[np.float64]  # what the expert would do, (samples, channels)
 
 
 Policy = Callable[[NDArray[Any]], NDArray[np.float64]]

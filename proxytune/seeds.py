@@ -37,17 +37,11 @@ RESET, COURSE, ACTING = 11, 12, 13
 
 
 class LessonSeeds(NamedTuple):
-    """The seeds of one lesson.
+    """The seeds of one lesson."""
 
-    Attributes:
-        theta: Seed of θ.
-        start: The start, to be taken modulo the number of starts.
-        episode: Seed of everything random in the lesson.
-    """
-
-    theta: int
-    start: int
-    episode: int
+    theta: int  # seed of θ
+    start: int  # the start, to be taken modulo the number of starts
+    episode: int  # seed of everything random in the lesson
 
 
 def episode_seed(study_seed: int, start: int) -> int:

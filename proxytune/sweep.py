@@ -172,40 +172,25 @@ class PodMean:
 
 @dataclass(frozen=True)
 class SweepPoint:
-    """One point of a curve.
+    """One point of a curve."""
 
-    Attributes:
-        value: The parameter, in its unit.
-        evaluation: What the agents scored there.
-        assessment: How useful the proxy is there; None if an agent has no episode that worked.
-        pod: "pod_pose" [m] and "pod_image" [of full scale]; empty where POD was not asked for or every replay failed.
-    """
-
-    value: float
-    evaluation: Evaluation
-    assessment: Assessment | None
+    value: float  # the parameter, in its unit
+    evaluation: Evaluation  # what the agents scored there
+    assessment: Assessment | None  # how useful the proxy is there; None if an agent has no episode that worked
+    # "pod_pose" [m] and "pod_image" [of full scale]; empty where POD was not asked for or every replay failed
     pod: Mapping[str, PodMean] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
 class SweepCurve:
-    """Usefulness along one parameter.
+    """Usefulness along one parameter."""
 
-    Attributes:
-        parameter: Its name.
-        unit: Its unit.
-        base: What the other parameters are held at; those not named are nominal.
-        metrics: How agents are compared.
-        points: In rising order of the parameter.
-        has_pod: Whether POD was asked for.
-    """
-
-    parameter: str
-    unit: str
-    base: Theta
-    metrics: tuple[str, ...]
-    points: tuple[SweepPoint, ...]
-    has_pod: bool = False
+    parameter: str  # its name
+    unit: str  # its unit
+    base: Theta  # what the other parameters are held at; those not named are nominal
+    metrics: tuple[str, ...]  # how agents are compared
+    points: tuple[SweepPoint, ...]  # in rising order of the parameter
+    has_pod: bool = False  # whether POD was asked for
 
     @property
     def label(self) -> str:
@@ -378,24 +363,17 @@ class Shape:
 
     Noise is told by the points' own 95 % intervals: one point is beyond noise of another where the two do not meet.
     That is cautious, since the points share their starts. A point without interval is beyond noise of none.
-
-    Attributes:
-        best: The values of the parameter where the measure is best; empty if it is defined nowhere.
-        score: Its score there.
-        near_best: The values where it is not worse than the best beyond noise.
-        held: Where the parameter is held when others are swept; None if that was not said.
-        below: What the measure does from there downwards: "worsens" if it never gets better again beyond noise and
-            ends up worse beyond noise, "flat" if neither, "turns" if it gets better again beyond noise, "unknown"
-            where there is no interval at an end, "unseen" without a point.
-        above: The same upwards.
     """
 
-    best: tuple[float, ...]
-    score: float | None
-    near_best: tuple[float, ...]
-    held: float | None
+    best: tuple[float, ...]  # the values of the parameter where the measure is best; empty if it is defined nowhere
+    score: float | None  # its score there
+    near_best: tuple[float, ...]  # the values where it is not worse than the best beyond noise
+    held: float | None  # where the parameter is held when others are swept; None if that was not said
+    # what the measure does from there downwards: "worsens" if it never gets better again beyond noise and ends up
+    # worse beyond noise, "flat" if neither, "turns" if it gets better again beyond noise, "unknown" where there
+    # is no interval at an end, "unseen" without a point
     below: Side
-    above: Side
+    above: Side  # the same upwards
 
     @property
     def monotone(self) -> bool | None:

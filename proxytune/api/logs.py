@@ -21,20 +21,13 @@ LONGEST_S = 3600.0
 
 @dataclass(frozen=True)
 class Wanted:
-    """Drives to be recorded.
+    """Drives to be recorded."""
 
-    Attributes:
-        repeats: Drives of each manoeuvre, or of each drive of the table.
-        seconds: Length of a manoeuvre [s].
-        frames: How many pictures are taken, on lane drives; 0: none.
-        seed: Of manoeuvres, starts and noise.
-        commands: A table of commands to drive instead of manoeuvres, as a log's commands.csv; None: manoeuvres.
-    """
-
-    repeats: int = 2
-    seconds: float = 60.0
-    frames: int = 0
-    seed: int = 1
+    repeats: int = 2  # drives of each manoeuvre, or of each drive of the table
+    seconds: float = 60.0  # length of a manoeuvre [s]
+    frames: int = 0  # how many pictures are taken, on lane drives; 0: none
+    seed: int = 1  # of manoeuvres, starts and noise
+    # a table of commands to drive instead of manoeuvres, as a log's commands.csv; None: manoeuvres
     commands: Path | None = None
 
 

@@ -32,25 +32,15 @@ House = TypeVar("House")
 
 @dataclass(frozen=True)
 class LogDiagnosis:
-    """The diagnosis of a robot from a log; at least one part is there.
+    """The diagnosis of a robot from a log; at least one part is there."""
 
-    Attributes:
-        log: The log's name.
-        robot: The robot.
-        motion: What its drives say, or None.
-        camera: What its frames say, or None.
-        motion_refused: Why its drives say nothing though it has commands and frames, else empty.
-        camera_refused: Why its frames say nothing though its drives do, else empty.
-        cautions: What is probably not meant in the log, a sentence each.
-    """
-
-    log: str
-    robot: Robot
-    motion: Diagnosis | None
-    camera: CameraDiagnosis | None
-    motion_refused: str = ""
-    camera_refused: str = ""
-    cautions: tuple[str, ...] = ()
+    log: str  # the log's name
+    robot: Robot  # the robot
+    motion: Diagnosis | None  # what its drives say, or None
+    camera: CameraDiagnosis | None  # what its frames say, or None
+    motion_refused: str = ""  # why its drives say nothing though it has commands and frames, else empty
+    camera_refused: str = ""  # why its frames say nothing though its drives do, else empty
+    cautions: tuple[str, ...] = ()  # what is probably not meant in the log, a sentence each
 
 
 def diagnose_log(

@@ -138,17 +138,12 @@ LANES = 1
 
 
 class FilmedDrive(NamedTuple):
-    """A lane drive with n pictures.
+    """A lane drive with n pictures."""
 
-    Attributes:
-        episode: Commands, and the measured pose at each.
-        times: Middle of each exposure (n,) [s]: half the blur and half the readout before the picture was finished.
-        pictures: Red, green and blue (n, rows, columns, 3), all effects of the instance in them.
-    """
-
-    episode: LogEpisode
+    episode: LogEpisode  # commands, and the measured pose at each
+    # middle of each exposure (n,) [s]: half the blur and half the readout before the picture was finished
     times: Floats
-    pictures: NDArray[np.uint8]
+    pictures: NDArray[np.uint8]  # red, green and blue (n, rows, columns, 3), all effects of the instance in them
 
 
 class _Lap(NamedTuple):

@@ -45,19 +45,12 @@ SIGNALS = ("", "x", "y", "heading", "left angle", "right angle", "bend", *MOTION
 
 
 class Panel(NamedTuple):
-    """Axes of one panel of a figure.
+    """Axes of one panel of a figure."""
 
-    Attributes:
-        signal: Along the axis, one of SIGNALS; empty for that of the cue.
-        label: Its label.
-        motion: Which motion is added, one of MOTIONS.
-        share: Whether as a share of that motion instead of in its unit.
-    """
-
-    signal: str
-    label: str
-    motion: str
-    share: bool = False
+    signal: str  # along the axis, one of SIGNALS; empty for that of the cue
+    label: str  # its label
+    motion: str  # which motion is added, one of MOTIONS
+    share: bool = False  # whether as a share of that motion instead of in its unit
 
 
 TURN = "turn rate [deg/s]"
@@ -98,43 +91,31 @@ class Draws:
 
 @dataclass(frozen=True)
 class Form:
-    """A form that an effect may take.
+    """A form that an effect may take."""
 
-    Attributes:
-        free: The parameters that are fitted, by coordinate: those of one coordinate share a value.
-        name: What is special about it: `left wheel`; empty where nothing is.
-        fixed: Values of other parameters; those that are not named stay where the model has them.
-        moved: Parameters that a search sets out with, the others where the model has them; all where none is named.
-        present: Whether the model has to have the effect already, must not have it, or either.
-        shown: What shows it, where that is not what shows the effect's other forms.
-    """
-
+    # the parameters that are fitted, by coordinate: those of one coordinate share a value
     free: tuple[tuple[str, ...], ...]
-    name: str = ""
+    name: str = ""  # what is special about it: `left wheel`; empty where nothing is
+    # values of other parameters; those that are not named stay where the model has them
     fixed: Mapping[str, float] = field(default_factory=dict)
+    # parameters that a search sets out with, the others where the model has them; all where none is named
     moved: tuple[str, ...] = ()
-    present: bool | None = None
-    shown: WheelCurve | Means | None = None
+    present: bool | None = None  # whether the model has to have the effect already, must not have it, or either
+    shown: WheelCurve | Means | None = None  # what shows it, where that is not what shows the effect's other forms
 
 
 @dataclass(frozen=True)
 class Trace:
-    """Knowledge of an effect on motion that a diagnosis goes by.
+    """Knowledge of an effect on motion that a diagnosis goes by."""
 
-    Attributes:
-        cues: The signals through which it acts.
-        shown: What shows it in a figure.
-        forms: The forms that it can take; where there are none, a single one with every parameter free.
-        stepwise: Whether its parameters change the motion by steps, so that no slope leads to their best values.
-        draws: What it draws, if it strikes at random.
-        placed: Whether it acts in a part of the map: its parameters after the first are x, y [m] and a radius [m].
-    """
-
-    cues: tuple[Cue, ...]
-    shown: WheelCurve | Means
+    cues: tuple[Cue, ...]  # the signals through which it acts
+    shown: WheelCurve | Means  # what shows it in a figure
+    # the forms that it can take; where there are none, a single one with every parameter free
     forms: tuple[Form, ...] = ()
+    # whether its parameters change the motion by steps, so that no slope leads to their best values
     stepwise: bool = False
-    draws: Draws | None = None
+    draws: Draws | None = None  # what it draws, if it strikes at random
+    # whether it acts in a part of the map: its parameters after the first are x, y [m] and a radius [m]
     placed: bool = False
 
     def shown_in(self, form: str) -> WheelCurve | Means:
@@ -183,25 +164,18 @@ CHANNELS: Mapping[Stage, tuple[str, ...]] = {
 
 @dataclass(frozen=True)
 class FilterContext:
-    """Context that a filter is told before the first sample.
+    """Context that a filter is told before the first sample."""
 
-    Attributes:
-        rate_hz: Samples per second.
-        rest: The signal before time zero, shape (…, channels).
-        nominal: The robot's nominal figures by name.
-        seed: Seed of everything random in the filter.
-        headings: Headings known beforehand, sample by sample (…, n) [rad]: the starting heading alone (n = 1), or the
-            measured ones.
-        places: Places known beforehand in the same way (…, n, 2) [m].
-        angles: Angles that the wheels have turned by, known beforehand in the same way (…, n, 2) [rad].
-    """
-
-    rate_hz: float
-    rest: Signal
-    nominal: Mapping[str, float]
-    seed: int = 0
+    rate_hz: float  # samples per second
+    rest: Signal  # the signal before time zero, shape (…, channels)
+    nominal: Mapping[str, float]  # the robot's nominal figures by name
+    seed: int = 0  # seed of everything random in the filter
+    # headings known beforehand, sample by sample (…, n) [rad]: the starting heading alone (n = 1), or the
+    # measured ones
     headings: Signal = field(default_factory=lambda: np.zeros(1))
+    # places known beforehand in the same way (…, n, 2) [m]
     places: Signal = field(default_factory=lambda: np.zeros((1, 2)))
+    # angles that the wheels have turned by, known beforehand in the same way (…, n, 2) [rad]
     angles: Signal = field(default_factory=lambda: np.zeros((1, 2)))
 
 

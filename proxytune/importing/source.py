@@ -76,93 +76,56 @@ class Channel:
 
 @dataclass(frozen=True)
 class Survey:
-    """A drive in numbers.
+    """A drive in numbers."""
 
-    Attributes:
-        name: What the log calls it.
-        seconds: From its first pose to its last [s].
-        poses: How many were measured.
-        poses_hz: At the usual interval between them.
-        lost: Share of the poses that dropped out, gaps apart.
-        gaps: Times without a pose of more than half a second.
-        longest_gap_s: The longest of them [s].
-        jitter_s: Standard deviation of the intervals between poses, drop-outs apart [s].
-        commands: How many were issued.
-        frames: How many pictures were taken.
-        lag_s: How long after its command it turns [s]; below 0: before it. None where that cannot be told.
-    """
-
-    name: str
-    seconds: float
-    poses: int
-    poses_hz: float
-    lost: float
-    gaps: int
-    longest_gap_s: float
-    jitter_s: float
-    commands: int
-    frames: int
-    lag_s: float | None
+    name: str  # what the log calls it
+    seconds: float  # from its first pose to its last [s]
+    poses: int  # how many were measured
+    poses_hz: float  # at the usual interval between them
+    lost: float  # share of the poses that dropped out, gaps apart
+    gaps: int  # times without a pose of more than half a second
+    longest_gap_s: float  # the longest of them [s]
+    jitter_s: float  # standard deviation of the intervals between poses, drop-outs apart [s]
+    commands: int  # how many were issued
+    frames: int  # how many pictures were taken
+    lag_s: float | None  # how long after its command it turns [s]; below 0: before it; none where that cannot be told
 
 
 @dataclass(frozen=True)
 class Source:
-    """The findings of an importer.
+    """The findings of an importer."""
 
-    Attributes:
-        form: What the source is, as in "ROS 2 bag (mcap)".
-        drives: Its drives.
-        channels: All that it holds, and what each was taken for.
-        notes: What was decided on the way, a sentence each.
-        surveys: The drives in numbers, once their stamps have been checked.
-    """
-
-    form: str
-    drives: tuple[Drive, ...]
-    channels: tuple[Channel, ...]
-    notes: tuple[str, ...]
-    surveys: tuple[Survey, ...] = ()
+    form: str  # what the source is, as in "ROS 2 bag (mcap)"
+    drives: tuple[Drive, ...]  # its drives
+    channels: tuple[Channel, ...]  # all that it holds, and what each was taken for
+    notes: tuple[str, ...]  # what was decided on the way, a sentence each
+    surveys: tuple[Survey, ...] = ()  # the drives in numbers, once their stamps have been checked
 
 
 @dataclass(frozen=True)
 class Wanted:
-    """Choices of what to take from a source; whatever is left empty is chosen by what there is.
+    """Choices of what to take from a source; whatever is left empty is chosen by what there is."""
 
-    Attributes:
-        commands: Topic of the commands; "none" for a log without them.
-        poses: Topic of the poses, or parent and child of a transform as "map>base_link".
-        frames: Topic of the pictures; "none" to leave them out.
-        stamps: Whose times count: "header" (when it was measured) or "receive" (when it was written down).
-        columns: Of a table or of arrays: our name to theirs, with the unit where it is not ours, as in
-            {"time": "stamp_ns:ns", "x": "pos_x_mm:mm", "heading": "yaw_deg:deg", "v": "cmd_lin"}.
-        kind: Kind of the commands, one of `proxytune.logs.COMMANDS`, where the source does not say.
-        vesc: The vesc.yaml of a car whose bag has what its VESC was sent.
-    """
-
-    commands: str = ""
-    poses: str = ""
-    frames: str = ""
-    stamps: str = "header"
+    commands: str = ""  # topic of the commands; "none" for a log without them
+    poses: str = ""  # topic of the poses, or parent and child of a transform as "map>base_link"
+    frames: str = ""  # topic of the pictures; "none" to leave them out
+    stamps: str = "header"  # whose times count: "header" (when it was measured) or "receive" (when it was written down)
+    # of a table or of arrays: our name to theirs, with the unit where it is not ours, as in {"time":
+    # "stamp_ns:ns", "x": "pos_x_mm:mm", "heading": "yaw_deg:deg", "v": "cmd_lin"}
     columns: Mapping[str, str] = field(default_factory=dict)
-    kind: str = ""
-    vesc: Path | None = None
+    kind: str = ""  # kind of the commands, one of `proxytune.logs.COMMANDS`, where the source does not say
+    vesc: Path | None = None  # the vesc.yaml of a car whose bag has what its VESC was sent
 
 
 @dataclass(frozen=True)
 class Facts:
-    """Statements that only the user can make of a source.
+    """Statements that only the user can make of a source."""
 
-    Attributes:
-        robot: Name of the robot; empty: the log's own name.
-        figures: Its wheel_radius_m, baseline_m and full_speed_m_s, where there is no folder of it.
-        road: The map that pictures show: a name, or the path of a map file.
-        clock_offset: Seconds that poses are stamped later than commands, "fit", or empty.
-    """
-
-    robot: str = ""
+    robot: str = ""  # name of the robot; empty: the log's own name
+    # its wheel_radius_m, baseline_m and full_speed_m_s, where there is no folder of it
     figures: Mapping[str, float] = field(default_factory=dict)
-    road: str = ""
-    clock_offset: str = ""
+    road: str = ""  # the map that pictures show: a name, or the path of a map file
+    clock_offset: str = ""  # seconds that poses are stamped later than commands, "fit", or empty
 
     @property
     def offset_s(self) -> float:

@@ -44,13 +44,9 @@ TRIED = 10
 
 @dataclass(frozen=True)
 class Distribution:
-    """p(θ): every parameter uniform within its bounds, or fixed where these are equal; S_θ where all are.
+    """p(θ): every parameter uniform within its bounds, or fixed where these are equal; S_θ where all are."""
 
-    Attributes:
-        bounds: Lowest and highest value of each parameter that is not nominal, by name.
-    """
-
-    bounds: Mapping[str, tuple[float, float]]
+    bounds: Mapping[str, tuple[float, float]]  # lowest and highest value of each parameter that is not nominal, by name
 
     def draw(self, seed: int) -> Theta:
         """θ of one lesson."""
@@ -133,13 +129,9 @@ FACTS = "facts"
 
 @dataclass(frozen=True)
 class Cache:
-    """A folder of `KIND-DIGEST.npz`, each with its arrays and, as JSON, what determines them.
+    """A folder of `KIND-DIGEST.npz`, each with its arrays and, as JSON, what determines them."""
 
-    Attributes:
-        folder: Where it is; made when first written to.
-    """
-
-    folder: Path
+    folder: Path  # where it is; made when first written to
 
     def get(self, kind: str, facts: Mapping[str, Any], make: Callable[[], Arrays]) -> Arrays:
         """The arrays that these facts determine, made and kept where they are not there yet.
@@ -227,17 +219,11 @@ KEYS = ("off_policy", "on_policy", "label")
 
 @dataclass(frozen=True)
 class Costs:
-    """The costs of one target sample, in any one unit.
+    """The costs of one target sample, in any one unit."""
 
-    Attributes:
-        off_policy: One that the expert's driving gives.
-        on_policy: One that the learner's own driving gives.
-        label: One answer of the expert, on top of either.
-    """
-
-    off_policy: float = 1.0
-    on_policy: float = 1.0
-    label: float = 0.0
+    off_policy: float = 1.0  # one that the expert's driving gives
+    on_policy: float = 1.0  # one that the learner's own driving gives
+    label: float = 0.0  # one answer of the expert, on top of either
 
     @property
     def per_sample(self) -> tuple[float, float]:

@@ -30,15 +30,10 @@ ROUNDING = 1e-9
 
 @dataclass(frozen=True)
 class Convergence:
-    """The rule by which a learner counts as having converged in the target.
+    """The rule by which a learner counts as having converged in the target."""
 
-    Attributes:
-        level: The score it has to reach: what it converges to without a proxy, unless stated otherwise.
-        tolerance: How far below that level still counts as there.
-    """
-
-    level: float
-    tolerance: float
+    level: float  # the score it has to reach: what it converges to without a proxy, unless stated otherwise
+    tolerance: float  # how far below that level still counts as there
 
     @property
     def threshold(self) -> float:
@@ -67,41 +62,26 @@ class LearningEstimate:
 
 @dataclass(frozen=True)
 class TeachingValue:
-    """The worth of a proxy as a teacher.
+    """The worth of a proxy as a teacher."""
 
-    Attributes:
-        without: Target samples needed without it, η(∅).
-        needed: Target samples needed with it, η(S).
-        plv: η(∅) − η(S): below zero where the proxy harms. None where either is not reached.
-        factor: η(∅) / η(S); None also where none are needed.
-        reduction: PLV as a share of η(∅).
-    """
-
-    without: LearningEstimate
-    needed: LearningEstimate
-    plv: LearningEstimate
-    factor: LearningEstimate
-    reduction: LearningEstimate
+    without: LearningEstimate  # target samples needed without it, η(∅)
+    needed: LearningEstimate  # target samples needed with it, η(S)
+    plv: LearningEstimate  # η(∅) − η(S): below zero where the proxy harms; none where either is not reached
+    factor: LearningEstimate  # η(∅) / η(S); None also where none are needed
+    reduction: LearningEstimate  # PLV as a share of η(∅)
 
 
 @dataclass(frozen=True)
 class SampleNeeds:
-    """The target samples that each learner needs, draw by draw from the posterior of the learning curves.
+    """The target samples that each learner needs, draw by draw from the posterior of the learning curves."""
 
-    Attributes:
-        curves: The scores that the examinations gave, by name.
-        draws: The mean curves.
-        when: When a learner counts as converged; its level is the posterior's mean where none was stated.
-        gain: What the learner without a proxy gains over the last doubling of samples; None where it has learnt nothing
-            before that.
-        needed: η by name (draws,); infinite where it is not reached up to the largest count.
-    """
-
-    curves: Mapping[str, LearningCurve]
-    draws: CurveDraws
-    when: Convergence
+    curves: Mapping[str, LearningCurve]  # the scores that the examinations gave, by name
+    draws: CurveDraws  # the mean curves
+    when: Convergence  # when a learner counts as converged; its level is the posterior's mean where none was stated
+    # what the learner without a proxy gains over the last doubling of samples; None where it has learnt nothing
+    # before that
     gain: float | None
-    needed: Mapping[str, Floats]
+    needed: Mapping[str, Floats]  # η by name (draws,); infinite where it is not reached up to the largest count
 
     @property
     def settled(self) -> bool:
@@ -235,17 +215,12 @@ ExaminationScores = Mapping[Examination, float]
 
 @dataclass(frozen=True)
 class AdaptiveDesign:
-    """The adaptive design of examinations.
+    """The adaptive design of examinations."""
 
-    Attributes:
-        counts: The grid of numbers of target samples, rising from 0; any number from its second on may be examined.
-        repetitions: The most repetitions there may be.
-        batch: How many examinations are chosen at once.
-    """
-
+    # the grid of numbers of target samples, rising from 0; any number from its second on may be examined
     counts: tuple[int, ...]
-    repetitions: int
-    batch: int
+    repetitions: int  # the most repetitions there may be
+    batch: int  # how many examinations are chosen at once
 
 
 def curves_of(counts: Sequence[int], scores: ExaminationScores) -> dict[str, LearningCurve]:

@@ -28,50 +28,31 @@ MOST_REHEARSAL = 0.99
 
 @dataclass(frozen=True)
 class TeachingSettings:
-    """The way in which a proxy's worth as a teacher is measured.
+    """The way in which a proxy's worth as a teacher is measured."""
 
-    Attributes:
-        target: The target's model.toml, in which the learners are fine-tuned and examined.
-        learner: Who learns, as "module:attribute".
-        proxy_samples: Samples that a proxy teaches.
-        target_samples: The grid of numbers of target samples, rising from 0.
-        seeds: How many times the whole is repeated; the most there may be of it where examinations are chosen.
-        lesson_s: How long the expert drives from one start [s].
-        level: The score that counts as converged; None for what a learner without a proxy converges to.
-        tolerance: How far below it still counts.
-        budget: How many proxies a study of the objective "plv" tries.
-        narrow: Whether such a study first finds by PRPV the θ that cannot be told from the best, and searches there.
-        widths: Bounds of the widths of p(θ) that such a study searches, by parameter; without one, θ is fixed.
-        proxies: What `teach` compares, by name: p(θ) of each.
-        published: What others published of proxies of these names, or of learning without one.
-        published_in: Where, and what was different there.
-        examinations: How many a learning curve takes, on average over all curves, where those that tell most are
-            chosen; None where every number of the grid is examined in every repetition.
-        rehearsal: Share of the proxy's samples among those of a fine-tuning, from 0 to below 1.
-        proxy_lessons: Who drives in the proxy, once something is learnt: EXPERT or LEARNER.
-        target_lessons: The same in the target.
-        costs: What a target sample costs.
-    """
-
-    target: Path
-    learner: str
-    proxy_samples: int
-    target_samples: tuple[int, ...]
-    seeds: int
-    lesson_s: float
-    level: float | None
-    tolerance: float
-    budget: int
-    narrow: bool
+    target: Path  # the target's model.toml, in which the learners are fine-tuned and examined
+    learner: str  # who learns, as "module:attribute"
+    proxy_samples: int  # samples that a proxy teaches
+    target_samples: tuple[int, ...]  # the grid of numbers of target samples, rising from 0
+    seeds: int  # how many times the whole is repeated; the most there may be of it where examinations are chosen
+    lesson_s: float  # how long the expert drives from one start [s]
+    level: float | None  # the score that counts as converged; None for what a learner without a proxy converges to
+    tolerance: float  # how far below it still counts
+    budget: int  # how many proxies a study of the objective "plv" tries
+    narrow: bool  # whether such a study first finds by PRPV the θ that cannot be told from the best, and searches there
+    # bounds of the widths of p(θ) that such a study searches, by parameter; without one, θ is fixed
     widths: Mapping[str, tuple[float, float]]
-    proxies: Mapping[str, Distribution]
+    proxies: Mapping[str, Distribution]  # what `teach` compares, by name: p(θ) of each
+    # what others published of proxies of these names, or of learning without one
     published: Mapping[str, Published] = field(default_factory=dict)
-    published_in: str = ""
+    published_in: str = ""  # where, and what was different there
+    # how many a learning curve takes, on average over all curves, where those that tell most are chosen; None
+    # where every number of the grid is examined in every repetition
     examinations: int | None = None
-    rehearsal: float = 0.0
-    proxy_lessons: str = EXPERT
-    target_lessons: str = EXPERT
-    costs: Costs = field(default_factory=Costs)
+    rehearsal: float = 0.0  # share of the proxy's samples among those of a fine-tuning, from 0 to below 1
+    proxy_lessons: str = EXPERT  # who drives in the proxy, once something is learnt: EXPERT or LEARNER
+    target_lessons: str = EXPERT  # the same in the target
+    costs: Costs = field(default_factory=Costs)  # what a target sample costs
 
     @property
     def later_keys(self) -> Mapping[str, Any]:

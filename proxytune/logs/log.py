@@ -54,26 +54,19 @@ class Measured(NamedTuple):
 
 @dataclass(frozen=True)
 class LogEpisode:
-    """One drive: poses on a regular grid of times, commands on the same or at times of their own.
+    """One drive: poses on a regular grid of times, commands on the same or at times of their own."""
 
-    Attributes:
-        name: What the column `episode` says.
-        times: Times of the samples (rows,) [s], 1 / rate_hz apart.
-        commands: What was commanded (rows, 2), in the units of the log's command kind, held until the next row; or
-            (M, 2) where commands have times of their own. Where the motors were cut, what drives is 0.
-        poses: Measured poses (rows, 3): x [m], y [m], heading [rad, unwrapped]; NaN where there is none.
-        wheels: Measured wheel speeds (rows, 2), left and right [rad/s], or None.
-        issued: When each command was issued (M,) [s], held until the next; None where they go with the samples.
-        measured: Poses as they were measured, where they have times of their own: `poses` has each moved to the
-            nearest free sample along the motion round it, by a sample at most. None where they lie on the grid.
-    """
-
-    name: str
-    times: Floats
+    name: str  # what the column `episode` says
+    times: Floats  # times of the samples (rows,) [s], 1 / rate_hz apart
+    # what was commanded (rows, 2), in the units of the log's command kind, held until the next row; or (M, 2)
+    # where commands have times of their own; where the motors were cut, what drives is 0
     commands: Floats
-    poses: Floats
-    wheels: Floats | None
+    poses: Floats  # measured poses (rows, 3): x [m], y [m], heading [rad, unwrapped]; NaN where there is none
+    wheels: Floats | None  # measured wheel speeds (rows, 2), left and right [rad/s], or None
+    # when each command was issued (M,) [s], held until the next; None where they go with the samples
     issued: Floats | None = None
+    # poses as they were measured, where they have times of their own: `poses` has each moved to the nearest free
+    # sample along the motion round it, by a sample at most; none where they lie on the grid
     measured: Measured | None = None
 
     @property
@@ -87,30 +80,19 @@ class LogEpisode:
 
 @dataclass(frozen=True)
 class Frames:
-    """The pictures that a log's camera took, N of them.
+    """The pictures that a log's camera took, N of them."""
 
-    Attributes:
-        paths: The files (N,).
-        drives: Number of the drive that each belongs to (N,).
-        times: Middle of each exposure on the poses' clock (N,) [s].
-        road: The map that they show: a name of the package's, or the path of a map file.
-        position_m: Standard deviation of the tracker's places [m]; None where it is not known.
-        heading_deg: Standard deviation of its headings [deg]; None where it is not known.
-        rectified: Whether the lens' distortion has been taken out.
-        readout_s: How long a rolling shutter takes from the first row to the last [s], where that is known; 0 for a
-            global shutter; None where it is not known.
-        fixed_exposure: Whether every picture was exposed alike.
-    """
-
-    paths: tuple[Path, ...]
-    drives: Whole
-    times: Floats
-    road: str
-    position_m: float | None = None
-    heading_deg: float | None = None
-    rectified: bool = False
+    paths: tuple[Path, ...]  # the files (N,)
+    drives: Whole  # number of the drive that each belongs to (N,)
+    times: Floats  # middle of each exposure on the poses' clock (N,) [s]
+    road: str  # the map that they show: a name of the package's, or the path of a map file
+    position_m: float | None = None  # standard deviation of the tracker's places [m]; None where it is not known
+    heading_deg: float | None = None  # standard deviation of its headings [deg]; None where it is not known
+    rectified: bool = False  # whether the lens' distortion has been taken out
+    # how long a rolling shutter takes from the first row to the last [s], where that is known; 0 for a global
+    # shutter; None where it is not known
     readout_s: float | None = None
-    fixed_exposure: bool = False
+    fixed_exposure: bool = False  # whether every picture was exposed alike
 
 
 @dataclass(frozen=True)

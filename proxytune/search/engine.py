@@ -31,15 +31,10 @@ class Library(NamedTuple):
 
 
 class Look(NamedTuple):
-    """The line by which an engine is drawn where several are compared.
+    """The line by which an engine is drawn where several are compared."""
 
-    Attributes:
-        colour: A colour as Matplotlib has it.
-        line: A line as Matplotlib has it.
-    """
-
-    colour: str
-    line: Literal["solid", "dashed", "dotted", "dashdot"] = "solid"
+    colour: str  # a colour as Matplotlib has it
+    line: Literal["solid", "dashed", "dotted", "dashdot"] = "solid"  # a line as Matplotlib has it
 
 
 @dataclass(frozen=True)

@@ -25,24 +25,17 @@ Compose = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 
 @dataclass(frozen=True)
 class Trial:
-    """A trial: where it was, and the score that is to be made small.
+    """A trial: where it was, and the score that is to be made small."""
 
-    Attributes:
-        values: The point, in the order of the box.
-        score: Its score, or None where the trial failed or is pending.
-        outcome: What the score was computed from, one value per output; None where the trial failed or is pending, or
-            where the score has no such parts.
-        pending: Whether it has been proposed and is not finished.
-        placement: Which placement noise it was driven under: trials with the same number share theirs, 0 the study's.
-        low_fidelity: Whether it is of a cheaper proxy, whose outputs tell of this one's and are not those.
-    """
-
-    values: Values
-    score: float | None
+    values: Values  # the point, in the order of the box
+    score: float | None  # its score, or None where the trial failed or is pending
+    # what the score was computed from, one value per output; None where the trial failed or is pending, or where
+    # the score has no such parts
     outcome: Values | None = None
-    pending: bool = False
+    pending: bool = False  # whether it has been proposed and is not finished
+    # which placement noise it was driven under: trials with the same number share theirs, 0 the study's
     placement: int = 0
-    low_fidelity: bool = False
+    low_fidelity: bool = False  # whether it is of a cheaper proxy, whose outputs tell of this one's and are not those
 
 
 class Proposer(Protocol):
@@ -130,20 +123,14 @@ class Search:
 
 @dataclass(frozen=True, eq=False)
 class Goal:
-    """The target as a search sees it.
+    """The target as a search sees it."""
 
-    Attributes:
-        outputs: Agent and metric of each output of a trial.
-        values: What each output is on the target, shape (outputs,); NaN where that is not known.
-        noise: Variance of the difference between a trial and the target at the same θ, by placement noise on both
-            sides, shape (outputs,).
-        compose: The score (PRPV) of outputs (…, outputs).
-    """
-
-    outputs: tuple[tuple[str, str], ...]
-    values: Floats
+    outputs: tuple[tuple[str, str], ...]  # agent and metric of each output of a trial
+    values: Floats  # what each output is on the target, shape (outputs,); NaN where that is not known
+    # variance of the difference between a trial and the target at the same θ, by placement noise on both sides,
+    # shape (outputs,)
     noise: Floats
-    compose: Compose
+    compose: Compose  # the score (PRPV) of outputs (…, outputs)
 
     def __post_init__(self) -> None:
         count = len(self.outputs)

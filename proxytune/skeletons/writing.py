@@ -19,17 +19,11 @@ from proxytune.settings import nearest
 
 @dataclass(frozen=True)
 class Skeleton:
-    """The files that `new` writes.
+    """The files that `new` writes."""
 
-    Attributes:
-        files: Texts by file name.
-        next: The commands to type then.
-        notes: What was read and what is to be known, in one line each.
-    """
-
-    files: Mapping[str, str]
-    next: tuple[str, ...]
-    notes: tuple[str, ...] = field(default=())
+    files: Mapping[str, str]  # texts by file name
+    next: tuple[str, ...]  # the commands to type then
+    notes: tuple[str, ...] = field(default=())  # what was read and what is to be known, in one line each
 
 
 fill = partial(fill_template, "skeletons")

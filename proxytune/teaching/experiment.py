@@ -30,40 +30,26 @@ CACHE = "teaching"
 
 @dataclass(frozen=True)
 class TeacherResult:
-    """The result of one proxy as a teacher.
+    """The result of one proxy as a teacher."""
 
-    Attributes:
-        name: What it is called.
-        proxy: Its p(θ).
-        curve: Scores in the target after so many target samples, having learnt from the proxy first.
-        zero_shot: Mean score before any target sample.
-        worth: PLV and what it is made of; None where the learner without a proxy has not converged.
-        cost: PLV in cost, in the unit of [teaching.costs]; None likewise.
-    """
-
-    name: str
-    proxy: learning.Distribution
+    name: str  # what it is called
+    proxy: learning.Distribution  # its p(θ)
+    # scores in the target after so many target samples, having learnt from the proxy first
     curve: learning.LearningCurve
-    zero_shot: learning.LearningEstimate
+    zero_shot: learning.LearningEstimate  # mean score before any target sample
+    # PLV and what it is made of; None where the learner without a proxy has not converged
     worth: learning.TeachingValue | None
-    cost: learning.LearningEstimate | None
+    cost: learning.LearningEstimate | None  # PLV in cost, in the unit of [teaching.costs]; None likewise
 
 
 @dataclass(frozen=True)
 class Experiment:
-    """The result of a learning experiment.
+    """The result of a learning experiment."""
 
-    Attributes:
-        settings: Of the study.
-        best_score: The score of a flawless examination.
-        needs: How many target samples each learner needs, from the posterior of all learning curves.
-        teachers: One per proxy, in the order of study.toml.
-    """
-
-    settings: study.StudySettings
-    best_score: float
-    needs: learning.SampleNeeds
-    teachers: tuple[TeacherResult, ...]
+    settings: study.StudySettings  # of the study
+    best_score: float  # the score of a flawless examination
+    needs: learning.SampleNeeds  # how many target samples each learner needs, from the posterior of all learning curves
+    teachers: tuple[TeacherResult, ...]  # one per proxy, in the order of study.toml
 
     @property
     def without(self) -> learning.LearningCurve:
@@ -252,22 +238,15 @@ SURE = 0.95
 
 @dataclass(frozen=True)
 class RankAgreement:
-    """The agreement of two rankings of the same proxies.
+    """The agreement of two rankings of the same proxies."""
 
-    Attributes:
-        tau: Kendall's τ, the median over draws: 1 the same ranking, −1 its reverse.
-        low: Lower end of its 95 % interval.
-        high: Upper end.
-        reversed: Pairs of proxies, by name, that the two figures order otherwise, each order sure; the first of a pair
-            is ahead by the second figure.
-        proxies: How many are ranked.
-    """
-
-    tau: float
-    low: float
-    high: float
+    tau: float  # kendall's τ, the median over draws: 1 the same ranking, −1 its reverse
+    low: float  # lower end of its 95 % interval
+    high: float  # upper end
+    # pairs of proxies, by name, that the two figures order otherwise, each order sure; the first of a pair is
+    # ahead by the second figure
     reversed: tuple[tuple[str, str], ...]
-    proxies: int
+    proxies: int  # how many are ranked
 
 
 def agreement(names: Sequence[str], first: Floats, second: Floats) -> RankAgreement:
@@ -299,17 +278,11 @@ def _sure(orders: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class Predictivity:
-    """The predictivity of a proxy.
+    """The predictivity of a proxy."""
 
-    Attributes:
-        prpv: PRPV of its episodes as they are.
-        chance: PRPV of a proxy that ranks the agents at random.
-        resampled: PRPV of resampled episodes, the same resample for all proxies (DRAWS,); None where episodes are not
-            repeated.
-    """
-
-    prpv: float
-    chance: usefulness.Chance
+    prpv: float  # PRPV of its episodes as they are
+    chance: usefulness.Chance  # PRPV of a proxy that ranks the agents at random
+    # PRPV of resampled episodes, the same resample for all proxies (DRAWS,); None where episodes are not repeated
     resampled: Floats | None = field(repr=False, compare=False)
 
     @property

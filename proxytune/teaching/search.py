@@ -138,48 +138,28 @@ OBJECTIVE = "plv"
 
 @dataclass(frozen=True)
 class PlvTrial:
-    """One proxy tried as a teacher.
+    """One proxy tried as a teacher."""
 
-    Attributes:
-        number: Counted from 1.
-        theta: Centre and, where searched, width of each parameter's distribution.
-        proxy: That p(θ).
-        curve: Its learning curve.
-        worth: What it is worth.
-        zero_shot: Its mean score before any target sample.
-    """
-
-    number: int
-    theta: Theta
-    proxy: learning.Distribution
-    curve: learning.LearningCurve
-    worth: learning.TeachingValue
-    zero_shot: learning.LearningEstimate
+    number: int  # counted from 1
+    theta: Theta  # centre and, where searched, width of each parameter's distribution
+    proxy: learning.Distribution  # that p(θ)
+    curve: learning.LearningCurve  # its learning curve
+    worth: learning.TeachingValue  # what it is worth
+    zero_shot: learning.LearningEstimate  # its mean score before any target sample
 
 
 @dataclass(frozen=True)
 class PlvStudy:
-    """The result of a study of learning value.
+    """The result of a study of learning value."""
 
-    Attributes:
-        settings: Of the study.
-        space: The box that was searched: the study's, or what PRPV left of it, and the widths'.
-        without: The learning curve without a proxy.
-        when: When a learner counts as converged.
-        trials: Every proxy tried, in order.
-        stopped: Why no further one was.
-        confirmed: The finalists, taught anew under seeds that the search has not used.
-        unable: Why finalists cannot teach, by name of those.
-    """
-
-    settings: StudySettings
-    space: Space
-    without: learning.LearningCurve
-    when: learning.Convergence
-    trials: tuple[PlvTrial, ...]
-    stopped: str
-    confirmed: Experiment
-    unable: Mapping[str, str] = field(default_factory=dict)
+    settings: StudySettings  # of the study
+    space: Space  # the box that was searched: the study's, or what PRPV left of it, and the widths'
+    without: learning.LearningCurve  # the learning curve without a proxy
+    when: learning.Convergence  # when a learner counts as converged
+    trials: tuple[PlvTrial, ...]  # every proxy tried, in order
+    stopped: str  # why no further one was
+    confirmed: Experiment  # the finalists, taught anew under seeds that the search has not used
+    unable: Mapping[str, str] = field(default_factory=dict)  # why finalists cannot teach, by name of those
 
     @property
     def narrowed(self) -> bool:
@@ -200,21 +180,13 @@ def plv_or_worst(one: PlvTrial | TeacherResult) -> float:
 
 @dataclass(frozen=True)
 class PlvSearch:
-    """A search for the proxy of highest learning value: what its trials are a function of, and where they are kept.
+    """A search for the proxy of highest learning value: what its trials are a function of, and where they are kept."""
 
-    Attributes:
-        settings: Of the study.
-        setup: Where learners are taught and examined.
-        store: Where trials are kept.
-        space: The box that is searched.
-        watcher: Hears of every point of a learning curve.
-    """
-
-    settings: StudySettings
-    setup: TeachingSetup
-    store: Store
-    space: Space
-    watcher: Watcher
+    settings: StudySettings  # of the study
+    setup: TeachingSetup  # where learners are taught and examined
+    store: Store  # where trials are kept
+    space: Space  # the box that is searched
+    watcher: Watcher  # hears of every point of a learning curve
 
     def run(self, proposer: search.Proposer, by_prpv: Theta | None = None) -> PlvStudy:
         """Try proxies until the budget of [teaching] is spent or a rule says stop, from wherever it was left.

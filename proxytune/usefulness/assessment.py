@@ -216,21 +216,15 @@ def assess(
 
 @dataclass(frozen=True)
 class Selection:
-    """Proxies ranked by PRPV.
+    """Proxies ranked by PRPV."""
 
-    Attributes:
-        ranking: Names and PRPV, best first.
-        differences: Every two proxies, the better one first; the intervals hold for all of them at once.
-        reason: Why there are no intervals, empty if there are.
-        choices: Every two compared by what choosing by them gains, and by what they save; none if not assessed.
-        together: The two that save most, used at once; None likewise.
-    """
-
-    ranking: tuple[tuple[str, int], ...]
+    ranking: tuple[tuple[str, int], ...]  # names and PRPV, best first
+    # every two proxies, the better one first; the intervals hold for all of them at once
     differences: tuple[Difference, ...]
-    reason: str = ""
+    reason: str = ""  # why there are no intervals, empty if there are
+    # every two compared by what choosing by them gains, and by what they save; none if not assessed
     choices: tuple[Difference, ...] = ()
-    together: Together | None = None
+    together: Together | None = None  # the two that save most, used at once; None likewise
 
 
 FEWEST_RESAMPLES, MOST_RESAMPLES = 100, 1_000_000

@@ -71,20 +71,13 @@ ASKED = Asked()
 
 @dataclass(frozen=True)
 class Panel:
-    """Observed winners on a part of the tables.
+    """Observed winners on a part of the tables."""
 
-    Attributes:
-        name: The task, or the one that is left out.
-        proxy_winners: The agents of the highest mean in the proxy.
-        target_winners: The same on the target.
-        regret: The most that choosing a winner of the proxy costs by the target's means.
-        expected_regret: Of deploying each agent there; None where nothing is known of the noise.
-    """
-
-    name: str
-    proxy_winners: tuple[str, ...]
-    target_winners: tuple[str, ...]
-    regret: float
+    name: str  # the task, or the one that is left out
+    proxy_winners: tuple[str, ...]  # the agents of the highest mean in the proxy
+    target_winners: tuple[str, ...]  # the same on the target
+    regret: float  # the most that choosing a winner of the proxy costs by the target's means
+    # of deploying each agent there; None where nothing is known of the noise
     expected_regret: Mapping[str, float] | None = None
 
     @property
@@ -97,41 +90,25 @@ class Panel:
 
 @dataclass(frozen=True)
 class Decision:
-    """The agent to deploy, and what it risks.
+    """The agent to deploy, and what it risks."""
 
-    Attributes:
-        winner: The agent of the lowest expected regret.
-        probability_best: That it is the target's best; None where nothing is known of the target's noise.
-        expected_regret: Of deploying each agent, in the metric's unit.
-        regret_interval: The 95 % interval of each agent's regret; None where nothing is known of the noise.
-        best_probabilities: Of each agent that it is the target's best; None likewise.
-        not_told_apart: Other agents that belong to the smallest set which holds the best with 95 %.
-        chosen_on: What was chosen by: a metric's name, or "mean of …".
-        observed: Winners by the means as they are, and the regret of the proxy's.
-        tasks: The same on each task alone.
-        without: The same without each task.
-        least_told: The difference of two agents that so many rollouts can tell apart; None likewise.
-        basis: What the draws rest on, in a phrase.
-        scores: Mean of each agent on the target with its 95 % interval; None likewise.
-        draws: Draws of the true means, shape (draws, agents), more being better; None likewise.
-        counts: Rollouts on the target that each agent's mean is worth; none where that is not known.
-    """
-
-    winner: str
-    probability_best: float | None
-    expected_regret: Mapping[str, float]
+    winner: str  # the agent of the lowest expected regret
+    probability_best: float | None  # that it is the target's best; None where nothing is known of the target's noise
+    expected_regret: Mapping[str, float]  # of deploying each agent, in the metric's unit
+    # the 95 % interval of each agent's regret; None where nothing is known of the noise
     regret_interval: Mapping[str, Ends] | None
-    best_probabilities: Mapping[str, float] | None
-    not_told_apart: tuple[str, ...]
-    chosen_on: str
-    observed: Panel
-    tasks: tuple[Panel, ...]
-    without: tuple[Panel, ...]
-    least_told: float | None
-    basis: str
+    best_probabilities: Mapping[str, float] | None  # of each agent that it is the target's best; None likewise
+    not_told_apart: tuple[str, ...]  # other agents that belong to the smallest set which holds the best with 95 %
+    chosen_on: str  # what was chosen by: a metric's name, or "mean of …"
+    observed: Panel  # winners by the means as they are, and the regret of the proxy's
+    tasks: tuple[Panel, ...]  # the same on each task alone
+    without: tuple[Panel, ...]  # the same without each task
+    least_told: float | None  # the difference of two agents that so many rollouts can tell apart; None likewise
+    basis: str  # what the draws rest on, in a phrase
+    # mean of each agent on the target with its 95 % interval; None likewise
     scores: Mapping[str, tuple[float, Ends]] | None
-    draws: Floats | None
-    counts: tuple[float, ...]
+    draws: Floats | None  # draws of the true means, shape (draws, agents), more being better; None likewise
+    counts: tuple[float, ...]  # rollouts on the target that each agent's mean is worth; none where that is not known
 
     def to_frame(self) -> "pd.DataFrame":
         """One row per agent: score, probability to be the best and expected regret, with intervals."""
@@ -363,23 +340,14 @@ def _means(
 
 @dataclass(frozen=True)
 class Difference:
-    """The lead of one proxy over another.
+    """The lead of one proxy over another."""
 
-    Attributes:
-        better: The better proxy.
-        worse: The other.
-        value: How much lower its PRPV is, or what choosing by it gains on the target or saves of real rollouts.
-        low: Lower end of the 95 % interval; None if nothing is known of noise.
-        high: Upper end of the same; None likewise.
-        on: By what it is better.
-    """
-
-    better: str
-    worse: str
-    value: float
-    low: float | None
-    high: float | None
-    on: Literal["prpv", "regret", "rollouts"] = "prpv"
+    better: str  # the better proxy
+    worse: str  # the other
+    value: float  # how much lower its PRPV is, or what choosing by it gains on the target or saves of real rollouts
+    low: float | None  # lower end of the 95 % interval; None if nothing is known of noise
+    high: float | None  # upper end of the same; None likewise
+    on: Literal["prpv", "regret", "rollouts"] = "prpv"  # by what it is better
 
     @property
     def beyond_noise(self) -> bool | None:

@@ -30,23 +30,16 @@ MEANINGS: dict[FloorKind, str] = {
 
 @dataclass(frozen=True)
 class NoiseFloor:
-    """PRPV of one domain against itself.
+    """PRPV of one domain against itself."""
 
-    Attributes:
-        kind: "same starts": two sets of episodes from the same starts under other placement noise, what a perfect
-            proxy would score. "halves": halves of the episodes, which hold other starts; no more than an upper bound
-            of that. "none": there is neither.
-        value: Of the means, or the mean over splits; None if there is no noise floor.
-        low: Lower end of the central 95 % of resamples or splits; None if there is no noise floor.
-        high: Upper end of the same; None if there is no noise floor.
-        reason: Why there is no noise floor, empty if there is one.
-    """
-
+    # "same starts": two sets of episodes from the same starts under other placement noise, what a perfect proxy
+    # would score. "halves": halves of the episodes, which hold other starts; no more than an upper bound of that.
+    # "none": there is neither
     kind: FloorKind
-    value: float | None = None
-    low: float | None = None
-    high: float | None = None
-    reason: str = ""
+    value: float | None = None  # of the means, or the mean over splits; None if there is no noise floor
+    low: float | None = None  # lower end of the central 95 % of resamples or splits; None if there is no noise floor
+    high: float | None = None  # upper end of the same; None if there is no noise floor
+    reason: str = ""  # why there is no noise floor, empty if there is one
 
     @property
     def title(self) -> str:
@@ -186,21 +179,13 @@ LEVEL = 0.05
 
 @dataclass(frozen=True)
 class Chance:
-    """PRPV when the proxy's scores are handed out to the agents at random.
+    """PRPV when the proxy's scores are handed out to the agents at random."""
 
-    Attributes:
-        mean: Mean over permutations.
-        deviation: Standard deviation over permutations.
-        p_value: How probable a PRPV as low as the proxy's is by chance, the proxy's own order counted as one.
-        permutations: How many were drawn, or all.
-        exact: Whether all orders were looked at.
-    """
-
-    mean: float
-    deviation: float
-    p_value: float
-    permutations: int
-    exact: bool = False
+    mean: float  # mean over permutations
+    deviation: float  # standard deviation over permutations
+    p_value: float  # how probable a PRPV as low as the proxy's is by chance, the proxy's own order counted as one
+    permutations: int  # how many were drawn, or all
+    exact: bool = False  # whether all orders were looked at
 
     @property
     def explains(self) -> bool:

@@ -41,15 +41,10 @@ class FlippedPair:
 
 @dataclass(frozen=True)
 class Prpv:
-    """A proxy relative predictivity value.
+    """A proxy relative predictivity value."""
 
-    Attributes:
-        value: Sum over ordered pairs of agents, 0 (same order) to K(K−1) (every pair reversed) for K agents.
-        inputs: What was compared, with its sample sizes.
-    """
-
-    value: int
-    inputs: Comparison
+    value: int  # sum over ordered pairs of agents, 0 (same order) to K(K−1) (every pair reversed) for K agents
+    inputs: Comparison  # what was compared, with its sample sizes
 
     @property
     def range(self) -> tuple[int, int]:

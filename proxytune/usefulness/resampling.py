@@ -29,22 +29,14 @@ class PrpvInterval:
 
     What it covers is the mean PRPV of many repeats of the whole experiment with as many episodes as this one had.
     Noise flips pairs, so this lies above the PRPV of endlessly many episodes; compare it with the noise floor.
-
-    Attributes:
-        value: PRPV of the episodes as they are.
-        expected: Mean over resamples, a smooth companion to the integer; None if there is no interval.
-        low: Lower end, at most the value; None if there is no interval.
-        high: Upper end, at least the value; None if there is no interval.
-        resamples: How many were drawn.
-        reason: Why there is no interval, empty if there is one.
     """
 
-    value: int
-    expected: float | None
-    low: float | None
-    high: float | None
-    resamples: int
-    reason: str = ""
+    value: int  # PRPV of the episodes as they are
+    expected: float | None  # mean over resamples, a smooth companion to the integer; None if there is no interval
+    low: float | None  # lower end, at most the value; None if there is no interval
+    high: float | None  # upper end, at least the value; None if there is no interval
+    resamples: int  # how many were drawn
+    reason: str = ""  # why there is no interval, empty if there is one
 
 
 def why_not_repeated(inputs: Comparison) -> str:

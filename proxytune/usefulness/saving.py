@@ -34,31 +34,22 @@ SORTED = "outcomes are sorted by value in every agent: episode numbers are no pa
 
 @dataclass(frozen=True)
 class Saving:
-    """What the proxy's rollouts are worth in rollouts on the target, of each agent on average.
+    """What the proxy's rollouts are worth in rollouts on the target, of each agent on average."""
 
-    Attributes:
-        kind: "paired": by starts that both sides have; "policies": by a model over agents; "none".
-        real_rollouts_worth: Real rollouts that the proxy's stand for, beside those made; None if it cannot be told.
-        interval: Its 95 % interval, by that of the correlation or of τ.
-        correlation: Of paired rollouts within an agent, or of means over agents; None likewise.
-        real: Rollouts on the target of an agent, on average.
-        simulated: Rollouts in the proxy of an agent, on average.
-        means: Each agent's rectified mean with its 95 % interval, on the metric it was asked for.
-        alone: The same from the target alone.
-        rectified: By metric, rectified means and what each is worth, (agents,) each, where pairs help beyond noise.
-        reason: Why nothing is saved or known; "" if something is.
-    """
-
+    # "paired": by starts that both sides have; "policies": by a model over agents; "none"
     kind: Literal["paired", "policies", "none"]
+    # real rollouts that the proxy's stand for, beside those made; None if it cannot be told
     real_rollouts_worth: float | None
-    interval: Ends | None
-    correlation: float | None
-    real: float
-    simulated: float
+    interval: Ends | None  # its 95 % interval, by that of the correlation or of τ
+    correlation: float | None  # of paired rollouts within an agent, or of means over agents; None likewise
+    real: float  # rollouts on the target of an agent, on average
+    simulated: float  # rollouts in the proxy of an agent, on average
+    # each agent's rectified mean with its 95 % interval, on the metric it was asked for
     means: Mapping[str, tuple[float, Ends]] = field(default_factory=dict)
-    alone: Mapping[str, tuple[float, Ends]] = field(default_factory=dict)
+    alone: Mapping[str, tuple[float, Ends]] = field(default_factory=dict)  # the same from the target alone
+    # by metric, rectified means and what each is worth, (agents,) each, where pairs help beyond noise
     rectified: Mapping[str, tuple[Floats, Floats]] = field(default_factory=dict)
-    reason: str = ""
+    reason: str = ""  # why nothing is saved or known; "" if something is
 
     @property
     def saved_share(self) -> float | None:

@@ -40,21 +40,14 @@ PATHS, MOST_ROUNDS = 200, 1000
 
 @dataclass(frozen=True)
 class Plan:
-    """Rollouts still to be made on the target.
+    """Rollouts still to be made on the target."""
 
-    Attributes:
-        rollouts: More rollouts of each agent that needs some.
-        bound: The regret, in the metric's unit, that is then exceeded with less than 5 %.
-        regret_bound: What is exceeded with 5 % now.
-        without_proxy: How many more it would take in all if the proxy counted for nothing; None if it does already.
-        reason: Why there is no plan; "" if there is one.
-    """
-
-    rollouts: Mapping[str, int]
-    bound: float
-    regret_bound: float | None
+    rollouts: Mapping[str, int]  # more rollouts of each agent that needs some
+    bound: float  # the regret, in the metric's unit, that is then exceeded with less than 5 %
+    regret_bound: float | None  # what is exceeded with 5 % now
+    # how many more it would take in all if the proxy counted for nothing; None if it does already
     without_proxy: int | None = None
-    reason: str = ""
+    reason: str = ""  # why there is no plan; "" if there is one
 
     @property
     def total(self) -> int:
@@ -120,23 +113,16 @@ def _more(draws: Floats, worth: Floats, bound: float) -> Floats:
 
 @dataclass(frozen=True)
 class Sequential:
-    """The test that may be looked at after every rollout; JSON has the names of its attributes.
+    """The test that may be looked at after every rollout; JSON has the names of its attributes."""
 
-    Attributes:
-        winner: The agent that is shown to be the target's best; None while none is.
-        decided_at: The round at which the winner was shown; None while none is.
-        rounds: Rollouts of every agent that were looked at, in the order of the table.
-        evidence: The least wealth of each agent against its rivals; the agent is shown to be best at `threshold`.
-        threshold: (K − 1)/α.
-        expected_rounds: Median of rounds to a decision, were the rates what they are, by bets with the proxy and
-            without; None where more than half take beyond 1000.
-    """
-
-    winner: str | None
-    decided_at: int | None
-    rounds: int
+    winner: str | None  # the agent that is shown to be the target's best; None while none is
+    decided_at: int | None  # the round at which the winner was shown; None while none is
+    rounds: int  # rollouts of every agent that were looked at, in the order of the table
+    # the least wealth of each agent against its rivals; the agent is shown to be best at `threshold`
     evidence: Mapping[str, float]
-    threshold: float
+    threshold: float  # (K − 1)/α
+    # median of rounds to a decision, were the rates what they are, by bets with the proxy and without; None where
+    # more than half take beyond 1000
     expected_rounds: Mapping[str, int | None]
 
 

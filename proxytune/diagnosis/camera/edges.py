@@ -38,21 +38,13 @@ BORDER = 2
 
 
 class Edges(NamedTuple):
-    """Points of markings' edges, n of them.
+    """Points of markings' edges, n of them."""
 
-    Attributes:
-        frame: Number of the picture (n,).
-        white: Whether the marking is white, else yellow (n,).
-        column: Place from the picture's left edge (n,) [pixel].
-        row: Place from its upper edge (n,) [pixel].
-        normal: Unit vector to the right and down from the floor into the marking (n, 2).
-    """
-
-    frame: NDArray[np.intp]
-    white: Flags
-    column: Floats
-    row: Floats
-    normal: Floats
+    frame: NDArray[np.intp]  # number of the picture (n,)
+    white: Flags  # whether the marking is white, else yellow (n,)
+    column: Floats  # place from the picture's left edge (n,) [pixel]
+    row: Floats  # place from its upper edge (n,) [pixel]
+    normal: Floats  # unit vector to the right and down from the floor into the marking (n, 2)
 
     def only(self, chosen: NDArray[Any]) -> "Edges":
         """The points that are chosen, by a mask or their numbers."""

@@ -32,17 +32,11 @@ DRAWS = 400
 
 @dataclass(frozen=True)
 class PictureError:
-    """Mean error on unseen frames.
+    """Mean error on unseen frames."""
 
-    Attributes:
-        value: Over all points, in pixels or grey levels.
-        interval: 95 %, from a bootstrap over frames.
-        frames: Mean of each frame, NaN where it shows no marking (N,).
-    """
-
-    value: float
-    interval: tuple[float, float]
-    frames: Floats
+    value: float  # over all points, in pixels or grey levels
+    interval: tuple[float, float]  # 95 %, from a bootstrap over frames
+    frames: Floats  # mean of each frame, NaN where it shows no marking (N,)
 
 
 def unseen_residuals(views: Views, state: State, names: Sequence[str]) -> Floats:
@@ -97,116 +91,71 @@ TWO_SIDED = 1.96
 
 @dataclass(frozen=True)
 class CameraEffect:
-    """An effect on the camera or its pictures that the model lacked.
+    """An effect on the camera or its pictures that the model lacked."""
 
-    Attributes:
-        effect: Its name.
-        names: Its parameters by name in θ.
-        nats: What leaving it out costs, None for what shows in brightness or sharpness.
-        error_without: Error on unseen frames without it over the error with it; None for noise, which no
-            model predicts.
-        rivals: Effects, the tracker's among them, that explain the same pictures.
-    """
-
-    effect: str
-    names: tuple[str, ...]
-    nats: float | None
+    effect: str  # its name
+    names: tuple[str, ...]  # its parameters by name in θ
+    nats: float | None  # what leaving it out costs, None for what shows in brightness or sharpness
+    # error on unseen frames without it over the error with it; None for noise, which no model predicts
     error_without: float | None
-    rivals: tuple[str, ...]
+    rivals: tuple[str, ...]  # effects, the tracker's among them, that explain the same pictures
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """Errors on unseen frames.
+    """Errors on unseen frames."""
 
-    Attributes:
-        before: Of the declared model.
-        after: Of the model with the effects that were found.
-        floor: Of the most flexible camera there is, what no camera could remove; None where none is known.
-        unit: "px" or "grey levels".
-    """
-
-    before: PictureError
-    after: PictureError
+    before: PictureError  # of the declared model
+    after: PictureError  # of the model with the effects that were found
+    # of the most flexible camera there is, what no camera could remove; None where none is known
     floor: PictureError | None
-    unit: str
+    unit: str  # "px" or "grey levels"
 
 
 @dataclass(frozen=True)
 class LaidLine:
-    """A line that lies beside its place on the map.
+    """A line that lies beside its place on the map."""
 
-    Attributes:
-        line: Which, as in "left white line".
-        stretch: On which of the road's segments, from 0.
-        right_m: How far to the right of its place, seen driving counter-clockwise; dashes: how far ahead [m].
-        interval: 95 % [m].
-    """
-
-    line: str
-    stretch: int
-    right_m: float
-    interval: tuple[float, float]
+    line: str  # which, as in "left white line"
+    stretch: int  # on which of the road's segments, from 0
+    right_m: float  # how far to the right of its place, seen driving counter-clockwise; dashes: how far ahead [m]
+    interval: tuple[float, float]  # 95 % [m]
 
 
 @dataclass(frozen=True)
 class LaidMap:
-    """The map as it was laid.
+    """The map as it was laid."""
 
-    Attributes:
-        offset: Of the whole map by name: x_m, y_m, heading_deg.
-        lines: Lines that lie measurably beside their places, the farthest first.
-        widths: How much wider lines and dashes are [m], by what they are.
-    """
-
-    offset: Mapping[str, Estimate]
-    lines: tuple[LaidLine, ...]
-    widths: Mapping[str, Estimate]
+    offset: Mapping[str, Estimate]  # of the whole map by name: x_m, y_m, heading_deg
+    lines: tuple[LaidLine, ...]  # lines that lie measurably beside their places, the farthest first
+    widths: Mapping[str, Estimate]  # how much wider lines and dashes are [m], by what they are
 
 
 @dataclass(frozen=True)
 class CameraDiagnosis:
-    """The diagnosis of a camera, from one log's frames.
+    """The diagnosis of a camera, from one log's frames."""
 
-    Attributes:
-        verdict: As a diagnosis of motion has it.
-        declared: Declared parameters, fitted without any other effect, by name in θ.
-        theta: All parameters of the extended model, by name in θ.
-        effects: The effects that were added.
-        negligible: Effects that there is evidence for, and which hardly change the error: no part of the model.
-        dropped: Parameters of those effects, as they were fitted before they were dropped, by name in θ.
-        candidates: What each effect of the catalogue costs if it is the only one added [nats], the best first.
-        pixels: Displacement of markings.
-        grey: Differences in brightness on the floor.
-        residual_fields: What is fixed to the camera and left over, before and after.
-        blemishes: Places in the picture that no camera effect explains: dirt, a bumper in view.
-        could_not_be_seen: Effects that these frames could not have shown.
-        next_views: What to take to tell what could not be told.
-        laid: How the map was laid.
-        matched: Share of the markings' edges that lie within 2 pixels of the map's.
-        notes: What else is to be known, a line each.
-        named: All fits.
-        gathered: All frames that were used.
-    """
-
-    verdict: str
-    declared: Mapping[str, Estimate]
-    theta: Mapping[str, Estimate]
-    effects: tuple[CameraEffect, ...]
+    verdict: str  # as a diagnosis of motion has it
+    declared: Mapping[str, Estimate]  # declared parameters, fitted without any other effect, by name in θ
+    theta: Mapping[str, Estimate]  # all parameters of the extended model, by name in θ
+    effects: tuple[CameraEffect, ...]  # the effects that were added
+    # effects that there is evidence for, and which hardly change the error: no part of the model
     negligible: tuple[CameraEffect, ...]
+    # parameters of those effects, as they were fitted before they were dropped, by name in θ
     dropped: Mapping[str, Estimate]
+    # what each effect of the catalogue costs if it is the only one added [nats], the best first
     candidates: Sequence[Subset]
-    pixels: Comparison
-    grey: Comparison
-    residual_fields: tuple[ResidualField, ResidualField]
-    blemishes: tuple[Blemish, ...]
-    could_not_be_seen: tuple[str, ...]
-    next_views: tuple[str, ...]
-    laid: LaidMap
-    matched: float
-    notes: tuple[str, ...]
-    named: CameraSelection
-    gathered: Gathered
+    pixels: Comparison  # displacement of markings
+    grey: Comparison  # differences in brightness on the floor
+    residual_fields: tuple[ResidualField, ResidualField]  # what is fixed to the camera and left over, before and after
+    blemishes: tuple[Blemish, ...]  # places in the picture that no camera effect explains: dirt, a bumper in view
+    could_not_be_seen: tuple[str, ...]  # effects that these frames could not have shown
+    next_views: tuple[str, ...]  # what to take to tell what could not be told
+    laid: LaidMap  # how the map was laid
+    matched: float  # share of the markings' edges that lie within 2 pixels of the map's
+    notes: tuple[str, ...]  # what else is to be known, a line each
+    named: CameraSelection  # all fits
+    gathered: Gathered  # all frames that were used
 
 
 def estimate_of(value: float, sd: float, unit: str) -> Estimate:

@@ -113,25 +113,15 @@ LARGEST_STEP = 0.75
 
 @dataclass(frozen=True)
 class CameraFit:
-    """A camera fitted to views.
+    """A camera fitted to views."""
 
-    Attributes:
-        views: What it was fitted to.
-        names: Parameters that were free, by name in θ.
-        state: All values.
-        information: What the views say of the free parameters, tape, map and poses left open (names, names).
-        tape_sd: Standard deviations of the tape's errors [m].
-        offset_sd: Standard deviations of the map's offset (3,).
-        pose_sd: Standard deviations of what is added to poses (N, 3).
-    """
-
-    views: Views
-    names: tuple[str, ...]
-    state: model.State
-    information: Floats
-    tape_sd: Floats
-    offset_sd: Floats
-    pose_sd: Floats
+    views: Views  # what it was fitted to
+    names: tuple[str, ...]  # parameters that were free, by name in θ
+    state: model.State  # all values
+    information: Floats  # what the views say of the free parameters, tape, map and poses left open (names, names)
+    tape_sd: Floats  # standard deviations of the tape's errors [m]
+    offset_sd: Floats  # standard deviations of the map's offset (3,)
+    pose_sd: Floats  # standard deviations of what is added to poses (N, 3)
 
     @property
     def theta(self) -> Mapping[str, float]:

@@ -237,19 +237,12 @@ REWEIGHTINGS = 5
 
 @dataclass(frozen=True)
 class Blemish:
-    """A place of the picture in which the floor is hidden in all frames.
+    """A place of the picture in which the floor is hidden in all frames."""
 
-    Attributes:
-        columns: First and last [pixel].
-        rows: First and last [pixel].
-        contrast: Share of the floor's contrast that is left: 0 behind a bumper.
-        share: Of the picture.
-    """
-
-    columns: tuple[int, int]
-    rows: tuple[int, int]
-    contrast: float
-    share: float
+    columns: tuple[int, int]  # first and last [pixel]
+    rows: tuple[int, int]  # first and last [pixel]
+    contrast: float  # share of the floor's contrast that is left: 0 behind a bumper
+    share: float  # of the picture
 
 
 def find_blemishes(measured: Pictures, predicted: NDArray[Any], floor: Flags, light: Light) -> tuple[Blemish, ...]:

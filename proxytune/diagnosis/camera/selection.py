@@ -172,19 +172,12 @@ LEAST_PX = 0.1
 
 @dataclass(frozen=True)
 class ResidualField:
-    """A field of displacements that a fitted camera leaves over.
+    """A field of displacements that a fitted camera leaves over."""
 
-    Attributes:
-        nats: What it explains on frames that it was not fitted to.
-        share: The same as a share of those frames' cost.
-        rms_px: Root mean square over the edge points [pixel].
-        field: Coefficients of POWERS to the right and down (terms, 2) [pixel].
-    """
-
-    nats: float
-    share: float
-    rms_px: float
-    field: Floats
+    nats: float  # what it explains on frames that it was not fitted to
+    share: float  # the same as a share of those frames' cost
+    rms_px: float  # root mean square over the edge points [pixel]
+    field: Floats  # coefficients of POWERS to the right and down (terms, 2) [pixel]
 
     @property
     def significant(self) -> bool:

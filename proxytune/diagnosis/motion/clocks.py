@@ -53,29 +53,21 @@ NONE = Offset(0.0, (0.0, 0.0))
 
 @dataclass(frozen=True)
 class Clocks:
-    """The clocks of a log's commands and poses.
+    """The clocks of a log's commands and poses."""
 
-    Attributes:
-        latency: From command to motion, beyond the motors' lag, drives of another clock apart [s].
-        offset: How much later poses are stamped, if the latency is proof of two clocks: what the latency has besides
-            the assumed delay; 0 where it is none.
-        assumed_delay_s: The delay that the robot is left with where an offset is taken out [s].
-        drives: Drives with another clock than the rest: how much later their poses are stamped than those [s].
-        jumps: Clocks that jump within a drive, of which the longest stretch is kept.
-        later_s: How much later the poses of each drive are put (E,) [s].
-        kept_s: From when to when each drive is used (E, 2) [s after its beginning].
-        declared_s: How much later poses are stamped, as log.toml declares; that was taken out beforehand [s], or None.
-        drift: How much later poses are stamped with every second [s/s]; all else is of what `without_drift` leaves.
-    """
-
-    latency: Offset
+    latency: Offset  # from command to motion, beyond the motors' lag, drives of another clock apart [s]
+    # how much later poses are stamped, if the latency is proof of two clocks: what the latency has besides the
+    # assumed delay; 0 where it is none
     offset: Offset
-    assumed_delay_s: float
+    assumed_delay_s: float  # the delay that the robot is left with where an offset is taken out [s]
+    # drives with another clock than the rest: how much later their poses are stamped than those [s]
     drives: dict[str, Offset]
-    jumps: tuple[Jump, ...]
-    later_s: Floats
-    kept_s: Floats
+    jumps: tuple[Jump, ...]  # clocks that jump within a drive, of which the longest stretch is kept
+    later_s: Floats  # how much later the poses of each drive are put (E,) [s]
+    kept_s: Floats  # from when to when each drive is used (E, 2) [s after its beginning]
+    # how much later poses are stamped, as log.toml declares; that was taken out beforehand [s], or None
     declared_s: float | None = None
+    # how much later poses are stamped with every second [s/s]; all else is of what `without_drift` leaves
     drift: Offset = NONE
 
     @property

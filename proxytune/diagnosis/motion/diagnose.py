@@ -95,29 +95,17 @@ def _is_at_floor(after: float, floor: Bracket, unnamed: bool, rules: Rules) -> b
 
 @dataclass(frozen=True)
 class HorizonError:
-    """The error of open-loop prediction over windows of one horizon, on drives that were not fitted.
+    """The error of open-loop prediction over windows of one horizon, on drives that were not fitted."""
 
-    Attributes:
-        horizon_s: Length of the windows [s].
-        windows: How many there are.
-        before: Position [m] with declared effects only.
-        after: Position [m] with the effects that were found.
-        ratio: After by before.
-        floor: Between which errors a model that is right would be [m].
-        heading_before: Heading [rad].
-        heading_after: Heading [rad].
-        heading_floor: What the noise of measured headings alone makes [rad].
-    """
-
-    horizon_s: float
-    windows: int
-    before: prediction.Rmse
-    after: prediction.Rmse
-    ratio: prediction.Ratio
-    floor: Bracket
-    heading_before: prediction.Rmse
-    heading_after: prediction.Rmse
-    heading_floor: float
+    horizon_s: float  # length of the windows [s]
+    windows: int  # how many there are
+    before: prediction.Rmse  # position [m] with declared effects only
+    after: prediction.Rmse  # position [m] with the effects that were found
+    ratio: prediction.Ratio  # after by before
+    floor: Bracket  # between which errors a model that is right would be [m]
+    heading_before: prediction.Rmse  # heading [rad]
+    heading_after: prediction.Rmse  # heading [rad]
+    heading_floor: float  # what the noise of measured headings alone makes [rad]
 
     @property
     def removable_left(self) -> float | None:
@@ -180,56 +168,36 @@ def main_error(errors: Sequence[HorizonError]) -> HorizonError:
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """The diagnosis of a model of motion, from one log.
+    """The diagnosis of a model of motion, from one log."""
 
-    Attributes:
-        log: The log's name.
-        robot: The robot.
-        verdict: "nothing missing", "explained", "partly explained", "unexplained" or "cannot be told".
-        declared: Declared parameters, fitted without any other effect, by name in θ.
-        theta: All parameters of the extended model, by name in θ.
-        effects: The effects that were added, all of which matter for prediction.
-        negligible: Effects that have evidence, and are not shown to matter for prediction: no part of the model.
-        effect_sizes: The error without each of both by the error with it, on drives that were not fitted, by name and
-            horizon.
-        multistep: The fit of the extended model's parameters to windows, None where single steps tell as well.
-        residual_depends_on: Signals that explain what no named effect does, those of the learnt discrepancy first.
-        errors: On the planar plant, by horizon, shortest first.
-        confirmed: The error over 2 s on the bullet plant, None where the robot has no body for it.
-        could_not_be_seen: Effects that these drives could not have shown.
-        next_drive: What to drive to tell rivals apart, or noise from what is missing; None where nothing is asked.
-        command: Kind of the log's commands.
-        parts: The drives that were fitted and tested.
-        found: What the search came to.
-        clocks: Those of the log, and of the log to test on where that is another.
-        robot_clusters: Two groups that the drives fall in as if of two robots, by number, or None.
-        drive_names: Names of the log's drives.
-        learning: What was learnt beside the named effects, and what that is worth.
-        period: What slows the robot down again and again, None where nothing does; no model has it.
-    """
-
-    log: str
-    robot: Robot
-    verdict: str
-    declared: Mapping[str, Estimate]
-    theta: Mapping[str, Estimate]
-    effects: tuple[AdoptedEffect, ...]
+    log: str  # the log's name
+    robot: Robot  # the robot
+    verdict: str  # "nothing missing", "explained", "partly explained", "unexplained" or "cannot be told"
+    declared: Mapping[str, Estimate]  # declared parameters, fitted without any other effect, by name in θ
+    theta: Mapping[str, Estimate]  # all parameters of the extended model, by name in θ
+    effects: tuple[AdoptedEffect, ...]  # the effects that were added, all of which matter for prediction
+    # effects that have evidence, and are not shown to matter for prediction: no part of the model
     negligible: tuple[AdoptedEffect, ...]
+    # the error without each of both by the error with it, on drives that were not fitted, by name and horizon
     effect_sizes: Mapping[str, effect_size.EffectSize]
+    # the fit of the extended model's parameters to windows, None where single steps tell as well
     multistep: multistep_fit.MultistepFit | None
+    # signals that explain what no named effect does, those of the learnt discrepancy first
     residual_depends_on: tuple[str, ...]
-    errors: tuple[HorizonError, ...]
-    confirmed: HorizonError | None
-    could_not_be_seen: tuple[str, ...]
+    errors: tuple[HorizonError, ...]  # on the planar plant, by horizon, shortest first
+    confirmed: HorizonError | None  # the error over 2 s on the bullet plant, None where the robot has no body for it
+    could_not_be_seen: tuple[str, ...]  # effects that these drives could not have shown
+    # what to drive to tell rivals apart, or noise from what is missing; None where nothing is asked
     next_drive: NextDrive | None
-    command: str
-    parts: Parts
-    found: Findings
-    clocks: tuple[Clocks, ...]
+    command: str  # kind of the log's commands
+    parts: Parts  # the drives that were fitted and tested
+    found: Findings  # what the search came to
+    clocks: tuple[Clocks, ...]  # those of the log, and of the log to test on where that is another
+    # two groups that the drives fall in as if of two robots, by number, or None
     robot_clusters: effect_size.RobotClusters | None
-    drive_names: tuple[str, ...]
-    learning: Learning
-    period: Period | None = None
+    drive_names: tuple[str, ...]  # names of the log's drives
+    learning: Learning  # what was learnt beside the named effects, and what that is worth
+    period: Period | None = None  # what slows the robot down again and again, None where nothing does; no model has it
 
     @property
     def dropped_values(self) -> dict[str, Estimate]:

@@ -81,29 +81,17 @@ class Discrepancy:
 
 
 class _Task(NamedTuple):
-    """What curves are fitted to, and what they begin with.
+    """What curves are fitted to, and what they begin with."""
 
-    Attributes:
-        drives: The drives.
-        theta: The model that they are added to.
-        offer: All curves.
-        moving: The model's own values that move along.
-        windows: All windows of FITTED_S.
-        before: Squared distance at their poses without curves (M,) [m²].
-        rival: The same of what curves have to better clearly to be of use, or None.
-        given: Squares by part of the first linearisation.
-        errors: Its errors (M, 3) [m].
-    """
-
-    drives: Drives
-    theta: Theta
-    offer: Learnt
-    moving: Sequence[Coordinate]
-    windows: Windows
-    before: Floats
-    rival: Floats | None
-    given: Sums
-    errors: Floats
+    drives: Drives  # the drives
+    theta: Theta  # the model that they are added to
+    offer: Learnt  # all curves
+    moving: Sequence[Coordinate]  # the model's own values that move along
+    windows: Windows  # all windows of FITTED_S
+    before: Floats  # squared distance at their poses without curves (M,) [m²]
+    rival: Floats | None  # the same of what curves have to better clearly to be of use, or None
+    given: Sums  # squares by part of the first linearisation
+    errors: Floats  # its errors (M, 3) [m]
 
     @property
     def aim(self) -> float:
@@ -298,19 +286,12 @@ EVALUATIONS = 25
 
 
 class MatchedEffect(NamedTuple):
-    """A named effect that keeps most of what curves gain.
+    """A named effect that keeps most of what curves gain."""
 
-    Attributes:
-        effect: Its name.
-        form: What is special about its form.
-        theta: Its values by their names in θ.
-        share: The share of the gain that it keeps; it was tuned to all windows, the curves to others than these.
-    """
-
-    effect: str
-    form: str
-    theta: Mapping[str, float]
-    share: float
+    effect: str  # its name
+    form: str  # what is special about its form
+    theta: Mapping[str, float]  # its values by their names in θ
+    share: float  # the share of the gain that it keeps; it was tuned to all windows, the curves to others than these
 
 
 def match_named_effect(
@@ -364,21 +345,15 @@ class LearntError(NamedTuple):
 
 @dataclass(frozen=True)
 class Learning:
-    """The learnt discrepancy and what it is worth.
+    """The learnt discrepancy and what it is worth."""
 
-    Attributes:
-        discrepancy: The curves, beside all named effects.
-        errors: What they are worth, by horizon, shortest first; empty where they are not used.
-        names_doubtful: Whether curves beside what is declared alone predict clearly better: then the names are wrong,
-            and the curves are these.
-        looks_like: The named effect that would do nearly as well as the curves, or None.
-        model: All values of the model with the curves, by name in θ; empty where they are not used.
-    """
-
-    discrepancy: Discrepancy
-    errors: tuple[LearntError, ...]
+    discrepancy: Discrepancy  # the curves, beside all named effects
+    errors: tuple[LearntError, ...]  # what they are worth, by horizon, shortest first; empty where they are not used
+    # whether curves beside what is declared alone predict clearly better: then the names are wrong, and the
+    # curves are these
     names_doubtful: bool
-    looks_like: MatchedEffect | None = None
+    looks_like: MatchedEffect | None = None  # the named effect that would do nearly as well as the curves, or None
+    # all values of the model with the curves, by name in θ; empty where they are not used
     model: Mapping[str, float] = field(default_factory=dict)
 
     @property

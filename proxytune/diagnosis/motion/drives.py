@@ -211,47 +211,28 @@ GAP_S = 1.0
 
 @dataclass(frozen=True)
 class Drives:
-    """A batch of E episodes with N measured increments of the pose.
+    """A batch of E episodes with N measured increments of the pose."""
 
-    Attributes:
-        robot: Whose drives they are.
-        tick_hz: Ticks per second.
-        rate_hz: Commands per second.
-        duties: Commands as fractions of full speed (E, T, 2), each the mean over its tick.
-        issued: Whether a command is issued within each tick (E, T).
-        rest: Duties before the first row (E, 2): what was sent, or wheel speeds of a drive that begins in motion.
-        headings: Measured heading at the start of each tick, interpolated (E, T).
-        episode: Episode of each increment (N,).
-        first: Tick at which it begins (N,).
-        last: Tick at which it ends (N,).
-        poses: Measured poses at its beginning and end (N, 2, 3).
-        linked: Whether it begins with the sample that ended the one before (N,).
-        block: Which of the blocks, the units that are left out in turn, it belongs to (N,).
-        travel: How far the robot moved meanwhile, noise averaged out (N, 2): [m], [rad].
-        wheels: Measured wheel speeds at each tick as fractions of full speed (E, T, 2), or None.
-        after: How long after the ticks `first` and `last` its poses were measured, or before (N, 2) [ticks]; None
-            where poses lie on ticks.
-        rules: Of a diagnosis of them.
-        ranges: Where values of effects are looked for, by name in θ, if not in their usual ranges.
-    """
-
-    robot: Robot
-    tick_hz: float
-    rate_hz: float
-    duties: Floats
-    issued: NDArray[np.bool_]
-    rest: Floats
-    headings: Floats
-    episode: Whole
-    first: Whole
-    last: Whole
-    poses: Floats
-    linked: NDArray[np.bool_]
-    block: Whole
-    travel: Floats
-    wheels: Floats | None
+    robot: Robot  # whose drives they are
+    tick_hz: float  # ticks per second
+    rate_hz: float  # commands per second
+    duties: Floats  # commands as fractions of full speed (E, T, 2), each the mean over its tick
+    issued: NDArray[np.bool_]  # whether a command is issued within each tick (E, T)
+    rest: Floats  # duties before the first row (E, 2): what was sent, or wheel speeds of a drive that begins in motion
+    headings: Floats  # measured heading at the start of each tick, interpolated (E, T)
+    episode: Whole  # episode of each increment (N,)
+    first: Whole  # tick at which it begins (N,)
+    last: Whole  # tick at which it ends (N,)
+    poses: Floats  # measured poses at its beginning and end (N, 2, 3)
+    linked: NDArray[np.bool_]  # whether it begins with the sample that ended the one before (N,)
+    block: Whole  # which of the blocks, the units that are left out in turn, it belongs to (N,)
+    travel: Floats  # how far the robot moved meanwhile, noise averaged out (N, 2): [m], [rad]
+    wheels: Floats | None  # measured wheel speeds at each tick as fractions of full speed (E, T, 2), or None
+    # how long after the ticks `first` and `last` its poses were measured, or before (N, 2) [ticks]; None where
+    # poses lie on ticks
     after: Floats | None = None
-    rules: Rules = RULES
+    rules: Rules = RULES  # of a diagnosis of them
+    # where values of effects are looked for, by name in θ, if not in their usual ranges
     ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     def __getstate__(self) -> dict[str, Any]:

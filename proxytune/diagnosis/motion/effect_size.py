@@ -196,17 +196,11 @@ AT_ONCE = 100_000
 
 
 class RobotClusters(NamedTuple):
-    """Two groups of drives with different wheel gains, as if of two robots.
+    """Two groups of drives with different wheel gains, as if of two robots."""
 
-    Attributes:
-        wheel: "left" or "right", of a car "driven" or "steered": whichever tells them apart better.
-        gains: Mean gain of that wheel in either group.
-        groups: Numbers of the drives in either group.
-    """
-
-    wheel: str
-    gains: tuple[float, float]
-    groups: tuple[tuple[int, ...], tuple[int, ...]]
+    wheel: str  # "left" or "right", of a car "driven" or "steered": whichever tells them apart better
+    gains: tuple[float, float]  # mean gain of that wheel in either group
+    groups: tuple[tuple[int, ...], tuple[int, ...]]  # numbers of the drives in either group
 
 
 def find_robot_clusters(drives: Drives, model: Fit) -> RobotClusters | None:

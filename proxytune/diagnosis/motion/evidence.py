@@ -40,27 +40,16 @@ class TriedEffect(NamedTuple):
 
 @dataclass(frozen=True)
 class AdoptedEffect:
-    """An effect that was added to the model.
+    """An effect that was added to the model."""
 
-    Attributes:
-        effect: Its name.
-        form: The form's name; empty for the plain one.
-        names: Its parameters in θ.
-        free: Those of them that were fitted, by coordinate.
-        gain: Evidence for it when it was adopted [nats].
-        p_value: How often chance gains as much.
-        rivals: Other effects that these drives cannot tell from it, with a form of each.
-        interval: The interval of a random effect's parameter.
-    """
-
-    effect: str
-    form: str
-    names: tuple[str, ...]
-    free: tuple[Coordinate, ...]
-    gain: float
-    p_value: float
-    rivals: tuple[Candidate, ...]
-    interval: tuple[float, float] | None = None
+    effect: str  # its name
+    form: str  # the form's name; empty for the plain one
+    names: tuple[str, ...]  # its parameters in θ
+    free: tuple[Coordinate, ...]  # those of them that were fitted, by coordinate
+    gain: float  # evidence for it when it was adopted [nats]
+    p_value: float  # how often chance gains as much
+    rivals: tuple[Candidate, ...]  # other effects that these drives cannot tell from it, with a form of each
+    interval: tuple[float, float] | None = None  # the interval of a random effect's parameter
 
 
 class Variant(NamedTuple):
@@ -89,24 +78,15 @@ class DroppedEffect(NamedTuple):
 
 @dataclass(frozen=True)
 class Findings:
-    """The result of a search for missing effects.
+    """The result of a search for missing effects."""
 
-    Attributes:
-        declared: The model with declared parameters only.
-        model: The model with the adopted effects.
-        adopted: Those effects, in the order of adoption.
-        tried: Every effect tried in the first round, best first.
-        unnamed_curves: Curves over signals that explain what no named effect does, best first.
-        curves: Curves over every signal before anything was added, best first.
-        negligible: Effects that were adopted and dropped again, each with the model that it was dropped from.
-    """
-
-    declared: Fit
-    model: Fit
-    adopted: tuple[AdoptedEffect, ...]
-    tried: tuple[TriedEffect, ...]
-    unnamed_curves: tuple[SignalCurve, ...]
-    curves: tuple[SignalCurve, ...]
+    declared: Fit  # the model with declared parameters only
+    model: Fit  # the model with the adopted effects
+    adopted: tuple[AdoptedEffect, ...]  # those effects, in the order of adoption
+    tried: tuple[TriedEffect, ...]  # every effect tried in the first round, best first
+    unnamed_curves: tuple[SignalCurve, ...]  # curves over signals that explain what no named effect does, best first
+    curves: tuple[SignalCurve, ...]  # curves over every signal before anything was added, best first
+    # effects that were adopted and dropped again, each with the model that it was dropped from
     negligible: tuple[DroppedEffect, ...] = ()
 
 

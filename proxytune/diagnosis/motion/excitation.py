@@ -61,17 +61,12 @@ SCALES = (1.0, 0.5, 0.25)
 
 @dataclass(frozen=True)
 class Limits:
-    """Limits of the next drive.
+    """Limits of the next drive."""
 
-    Attributes:
-        room: Length and width of the floor [m]; where it is None, as far as the poses of the log reach.
-        fastest: Greatest command, as a fraction of full speed.
-        seconds: Length of a drive [s].
-    """
-
+    # length and width of the floor [m]; where it is None, as far as the poses of the log reach
     room: tuple[float, float] | None = None
-    fastest: float = 1.0
-    seconds: float = 20.0
+    fastest: float = 1.0  # greatest command, as a fraction of full speed
+    seconds: float = 20.0  # length of a drive [s]
 
 
 LIMITS = Limits()
@@ -364,29 +359,18 @@ class Sequences:
 
 @dataclass(frozen=True)
 class NextDrive:
-    """A drive that tells rivals apart, or noise from what is missing if it is driven several times.
+    """A drive that tells rivals apart, or noise from what is missing if it is driven several times."""
 
-    Attributes:
-        name: What it is called.
-        description: How to drive it.
-        between: What it tells apart.
-        nats_per_minute: How clearly a minute of it speaks.
-        commands: As fractions of full speed, of a car as throttle and steering, a row each 1 / rate_hz (rows, 2).
-        rate_hz: Commands per second.
-        times: How often to drive it from the same commands.
-        room: Length and width that it keeps to [m].
-        manoeuvre: The best manoeuvre of the library and what a minute of that is worth [nats], within the same limits;
-            None where none keeps to the room.
-    """
-
-    name: str
-    description: str
-    between: tuple[str, ...]
-    nats_per_minute: float
-    commands: Floats
-    rate_hz: float
-    times: int
-    room: tuple[float, float]
+    name: str  # what it is called
+    description: str  # how to drive it
+    between: tuple[str, ...]  # what it tells apart
+    nats_per_minute: float  # how clearly a minute of it speaks
+    commands: Floats  # as fractions of full speed, of a car as throttle and steering, a row each 1 / rate_hz (rows, 2)
+    rate_hz: float  # commands per second
+    times: int  # how often to drive it from the same commands
+    room: tuple[float, float]  # length and width that it keeps to [m]
+    # the best manoeuvre of the library and what a minute of that is worth [nats], within the same limits; None
+    # where none keeps to the room
     manoeuvre: tuple[str, float] | None
 
     @property

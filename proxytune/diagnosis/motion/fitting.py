@@ -52,25 +52,15 @@ SCANS = (np.geomspace(0.5, 1.8, 25), np.geomspace(0.95, 1.05, 15), np.geomspace(
 
 @dataclass(frozen=True)
 class Fit:
-    """A model fitted to drives.
+    """A model fitted to drives."""
 
-    Attributes:
-        drives: What it was fitted to.
-        theta: All its values besides the robot's nominal ones, fitted or fixed.
-        free: The coordinates that were fitted.
-        noise: Drive and pose noise.
-        whiten: The whitener of that noise.
-        innovations: Whitened residuals of the increments, white noise if the model is right (3N,).
-        slopes: Their change per unit of each coordinate, as a fraction of its range (3N, coordinates).
-    """
-
-    drives: Drives
-    theta: Mapping[str, float]
-    free: tuple[Coordinate, ...]
-    noise: Noise
-    whiten: Whitener
-    innovations: Floats
-    slopes: Floats
+    drives: Drives  # what it was fitted to
+    theta: Mapping[str, float]  # all its values besides the robot's nominal ones, fitted or fixed
+    free: tuple[Coordinate, ...]  # the coordinates that were fitted
+    noise: Noise  # drive and pose noise
+    whiten: Whitener  # the whitener of that noise
+    innovations: Floats  # whitened residuals of the increments, white noise if the model is right (3N,)
+    slopes: Floats  # their change per unit of each coordinate, as a fraction of its range (3N, coordinates)
 
 
 def fit(drives: Drives, theta: Theta, free: tuple[Coordinate, ...], noise: Noise = FIRST_GUESS) -> Fit:

@@ -61,15 +61,10 @@ HUBER = 3.0
 
 @dataclass(frozen=True)
 class Noise:
-    """The scatter of measured motion about a model that is right.
+    """The scatter of measured motion about a model that is right."""
 
-    Attributes:
-        drive: Standard deviation after one metre: forward [m], sideways [m], heading [rad].
-        pose: Standard deviation of a measured pose: position [m], heading [rad].
-    """
-
-    drive: tuple[float, float, float]
-    pose: tuple[float, float]
+    drive: tuple[float, float, float]  # standard deviation after one metre: forward [m], sideways [m], heading [rad]
+    pose: tuple[float, float]  # standard deviation of a measured pose: position [m], heading [rad]
 
 
 FIRST_GUESS = Noise((0.02, 0.01, 0.1), (0.003, 0.01))

@@ -140,21 +140,14 @@ class Rmse(NamedTuple):
 
 
 class Ratio(NamedTuple):
-    """The ratio of two errors over the same windows.
+    """The ratio of two errors over the same windows."""
 
-    Attributes:
-        value: The ratio of the two root mean squares.
-        interval: Its 95 % interval, from leaving blocks out in turn.
-        p_below: How likely chance makes so many blocks' ratios so far below 1 (Wilcoxon's signed ranks, one-sided).
-        p_above: The same above 1.
-        shown_at: The chance below which it is shown to be off 1.
-    """
-
-    value: float
-    interval: tuple[float, float]
+    value: float  # the ratio of the two root mean squares
+    interval: tuple[float, float]  # its 95 % interval, from leaving blocks out in turn
+    # how likely chance makes so many blocks' ratios so far below 1 (Wilcoxon's signed ranks, one-sided)
     p_below: float = 1.0
-    p_above: float = 1.0
-    shown_at: float = RULES.ratio_p_value
+    p_above: float = 1.0  # the same above 1
+    shown_at: float = RULES.ratio_p_value  # the chance below which it is shown to be off 1
 
     @property
     def below(self) -> bool:
@@ -297,19 +290,12 @@ def _place_at(start: Floats, walked: Floats, origin: Floats) -> Floats:
 
 
 class Agreement(NamedTuple):
-    """The errors of predicted poses over windows of the horizon.
+    """The errors of predicted poses over windows of the horizon."""
 
-    Attributes:
-        place: RMSE of position [m], 0 where nothing can be compared.
-        turn: RMSE of heading [rad], 0 where nothing can be compared.
-        poses: How many poses were compared.
-        windows: In how many windows.
-    """
-
-    place: float
-    turn: float
-    poses: int
-    windows: int
+    place: float  # RMSE of position [m], 0 where nothing can be compared
+    turn: float  # RMSE of heading [rad], 0 where nothing can be compared
+    poses: int  # how many poses were compared
+    windows: int  # in how many windows
 
 
 def agreement(table: pd.DataFrame, log: Log, horizon_s: float) -> Agreement:

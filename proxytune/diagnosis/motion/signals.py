@@ -262,17 +262,11 @@ REFITTED = 3
 
 
 class SignalCurve(NamedTuple):
-    """Curves over one signal, fitted to what a model leaves over.
+    """Curves over one signal, fitted to what a model leaves over."""
 
-    Attributes:
-        group: The group.
-        gain: Its gain in log-likelihood on blocks that it was not fitted to [nats].
-        weights: Weight of each of its basis functions.
-    """
-
-    group: SignalGroup
-    gain: float
-    weights: Floats
+    group: SignalGroup  # the group
+    gain: float  # its gain in log-likelihood on blocks that it was not fitted to [nats]
+    weights: Floats  # weight of each of its basis functions
 
 
 def fit_curves(fitted: Fit) -> list[SignalCurve]:

@@ -20,23 +20,14 @@ GRAVITY = 9.81
 
 @dataclass(frozen=True)
 class BulletCase:
-    """A bullet robot whose physics is not the nominal one.
+    """A bullet robot whose physics is not the nominal one."""
 
-    Attributes:
-        name: What it is.
-        changes: Names of CHANGES, or "left_wheel", each with its size.
-        seed: Seed of the manoeuvres and of the noise.
-        trim: Its trim.
-        delay: Its delay [s].
-        noise: Key of LEVELS.
-    """
-
-    name: str
-    changes: Mapping[str, float]
-    seed: int
-    trim: float = 0.04
-    delay: float = 0.12
-    noise: str = "normal"
+    name: str  # what it is
+    changes: Mapping[str, float]  # names of CHANGES, or "left_wheel", each with its size
+    seed: int  # seed of the manoeuvres and of the noise
+    trim: float = 0.04  # its trim
+    delay: float = 0.12  # its delay [s]
+    noise: str = "normal"  # key of LEVELS
 
 
 def make_bullet_log(case: BulletCase, *, episodes: int = 6, seconds: float = 30.0, noiseless: bool = False) -> Log:

@@ -48,25 +48,15 @@ FRESH_DRAWS = 64
 
 @dataclass(frozen=True, eq=False)
 class Simulated:
-    """What was simulated, and how it changes between.
+    """What was simulated, and how it changes between."""
 
-    Attributes:
-        agents: Their names.
-        points: The θ in the unit cube, shape (n, parameters).
-        means: The outputs there, shape (n, outputs): every agent's mean metrics.
-        scales: Length scale of each parameter, in widths of the box.
-        smooth: Variance of each output's smooth course.
-        rough: Variance of each output round that, from θ to θ.
-        placements: What another placement of the robot changed at other θ, shape (m, outputs).
-    """
-
-    agents: tuple[str, ...]
-    points: Floats
-    means: Floats
-    scales: Floats
-    smooth: Floats
-    rough: Floats
-    placements: Floats
+    agents: tuple[str, ...]  # their names
+    points: Floats  # the θ in the unit cube, shape (n, parameters)
+    means: Floats  # the outputs there, shape (n, outputs): every agent's mean metrics
+    scales: Floats  # length scale of each parameter, in widths of the box
+    smooth: Floats  # variance of each output's smooth course
+    rough: Floats  # variance of each output round that, from θ to θ
+    placements: Floats  # what another placement of the robot changed at other θ, shape (m, outputs)
 
     @property
     def roughness(self) -> float:
@@ -123,19 +113,12 @@ def simulated() -> Simulated:
 
 @dataclass(frozen=True, eq=False)
 class Course:
-    """One function through what was simulated: every output over the box, drawn from the Gaussian processes.
+    """One function through what was simulated: every output over the box, drawn from the Gaussian processes."""
 
-    Attributes:
-        frequencies: Of the waves it is made of, shape (parameters, waves).
-        phases: Their phases.
-        heights: Their heights in each output, shape (waves, outputs).
-        weights: What draws it through the points, shape (n, outputs).
-    """
-
-    frequencies: Floats
-    phases: Floats
-    heights: Floats
-    weights: Floats
+    frequencies: Floats  # of the waves it is made of, shape (parameters, waves)
+    phases: Floats  # their phases
+    heights: Floats  # their heights in each output, shape (waves, outputs)
+    weights: Floats  # what draws it through the points, shape (n, outputs)
 
     def __call__(self, unit: Floats) -> Floats:
         """Every output at a point of the unit cube, in standard deviations from its mean."""

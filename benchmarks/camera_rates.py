@@ -27,19 +27,12 @@ FLAGGED = ("partly explained", "unexplained")
 
 @dataclass(frozen=True)
 class Answer:
-    """A set's truth and what was said.
+    """A set's truth and what was said."""
 
-    Attributes:
-        truth: What is true of the set, as Truth has it.
-        camera: `camera` of the diagnosis' document; empty where there is none.
-        seconds: Processor time of the diagnosis [s].
-        problem: What went wrong, empty as a rule.
-    """
-
-    truth: Mapping[str, Any]
-    camera: Mapping[str, Any]
-    seconds: float
-    problem: str = ""
+    truth: Mapping[str, Any]  # what is true of the set, as Truth has it
+    camera: Mapping[str, Any]  # `camera` of the diagnosis' document; empty where there is none
+    seconds: float  # processor time of the diagnosis [s]
+    problem: str = ""  # what went wrong, empty as a rule
 
     @property
     def key(self) -> tuple[str, int]:

@@ -46,21 +46,13 @@ EXAMPLES = (
 
 
 class Arena(NamedTuple):
-    """What engines are compared on.
+    """What engines are compared on."""
 
-    Attributes:
-        objective: What each of them makes small.
-        budget: Evaluations per run.
-        initial: How many of these are the shared design.
-        jobs: How many runs at a time; a study's own episodes run in parallel instead.
-        bars: Shows how many runs are finished.
-    """
-
-    objective: Objective
-    budget: int
-    initial: int
-    jobs: int
-    bars: Bars
+    objective: Objective  # what each of them makes small
+    budget: int  # evaluations per run
+    initial: int  # how many of these are the shared design
+    jobs: int  # how many runs at a time; a study's own episodes run in parallel instead
+    bars: Bars  # shows how many runs are finished
 
 
 class WithinRun:

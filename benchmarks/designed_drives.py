@@ -38,19 +38,12 @@ START = {"trim": 0.0, "delay": 0.15}
 
 
 class Question(NamedTuple):
-    """What is hidden, and as what it could pass.
+    """What is hidden, and as what it could pass."""
 
-    Attributes:
-        effect: The catalogue's name of it.
-        rival: That of the other; "" for what is declared alone.
-        hidden: The name and figures that `hidden_cases.py` has for it.
-        probe: Where the fit of the effect begins.
-    """
-
-    effect: str
-    rival: str
-    hidden: tuple[str, dict[str, float]]
-    probe: tuple[float, ...]
+    effect: str  # the catalogue's name of it
+    rival: str  # that of the other; "" for what is declared alone
+    hidden: tuple[str, dict[str, float]]  # the name and figures that `hidden_cases.py` has for it
+    probe: tuple[float, ...]  # where the fit of the effect begins
 
 
 QUESTIONS = (

@@ -31,27 +31,16 @@ Figures = Mapping[str, float]
 
 @dataclass(frozen=True)
 class Case:
-    """A car that one log is measured of.
+    """A car that one log is measured of."""
 
-    Attributes:
-        name: What it is.
-        effects: What is hidden: names of functions here with their figures.
-        noise: Key of LEVELS.
-        seed: Seed of the drives and of everything random.
-        offset: Of its steering, as a fraction of full lock.
-        delay: Its delay [s].
-        right: For every hidden effect, the catalogue's names that count as right.
-        depends_on: The signal that an effect outside of any catalogue depends on.
-    """
-
-    name: str
-    effects: tuple[tuple[str, Figures], ...]
-    noise: str
-    seed: int
-    offset: float
-    delay: float
-    right: tuple[tuple[str, ...], ...] = ()
-    depends_on: str = ""
+    name: str  # what it is
+    effects: tuple[tuple[str, Figures], ...]  # what is hidden: names of functions here with their figures
+    noise: str  # key of LEVELS
+    seed: int  # seed of the drives and of everything random
+    offset: float  # of its steering, as a fraction of full lock
+    delay: float  # its delay [s]
+    right: tuple[tuple[str, ...], ...] = ()  # for every hidden effect, the catalogue's names that count as right
+    depends_on: str = ""  # the signal that an effect outside of any catalogue depends on
 
 
 class Scene(NamedTuple):

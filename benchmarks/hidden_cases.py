@@ -32,27 +32,16 @@ Stage = Mapping[str, Callable[..., Array]]
 
 @dataclass(frozen=True)
 class Case:
-    """A robot that one log is measured of.
+    """A robot that one log is measured of."""
 
-    Attributes:
-        name: What it is.
-        effects: What is hidden: names of functions here with their figures.
-        noise: Key of LEVELS.
-        seed: Seed of the manoeuvres and of everything random.
-        trim: Its trim.
-        delay: Its delay [s].
-        right: For every hidden effect, the catalogue's names that count as right.
-        depends_on: The signal that an effect outside of any catalogue depends on.
-    """
-
-    name: str
-    effects: tuple[tuple[str, Figures], ...]
-    noise: str
-    seed: int
-    trim: float
-    delay: float
-    right: tuple[tuple[str, ...], ...] = ()
-    depends_on: str = ""
+    name: str  # what it is
+    effects: tuple[tuple[str, Figures], ...]  # what is hidden: names of functions here with their figures
+    noise: str  # key of LEVELS
+    seed: int  # seed of the manoeuvres and of everything random
+    trim: float  # its trim
+    delay: float  # its delay [s]
+    right: tuple[tuple[str, ...], ...] = ()  # for every hidden effect, the catalogue's names that count as right
+    depends_on: str = ""  # the signal that an effect outside of any catalogue depends on
 
 
 class Scene(NamedTuple):

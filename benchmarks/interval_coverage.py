@@ -80,17 +80,12 @@ CLAIMS = ("PRPV", "floor", "excess", "PPV")
 
 @dataclass(frozen=True)
 class Split:
-    """What a study would say, and what is so.
+    """What a study would say, and what is so."""
 
-    Attributes:
-        said: The expectation.
-        holds: Whether (of the floor: in what share of next tables) each claim's interval holds, in the order of CLAIMS.
-        excess: How much more PRPV is expected of the proxy than of the target itself.
-    """
-
-    said: Expectation
+    said: Expectation  # the expectation
+    # whether (of the floor: in what share of next tables) each claim's interval holds, in the order of CLAIMS
     holds: tuple[float, ...]
-    excess: float
+    excess: float  # how much more PRPV is expected of the proxy than of the target itself
 
 
 def drawn(tables: Floats, rng: np.random.Generator, count: int = 1) -> Floats:

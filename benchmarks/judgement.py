@@ -14,45 +14,30 @@ from proxytune.search import Knowledge, Trial, Values, code_of, fit_surrogate, l
 
 @dataclass(frozen=True)
 class Reading:
-    """What every output of the visited points tells of θ, whichever engine chose them.
+    """What every output of the visited points tells of θ, whichever engine chose them."""
 
-    Attributes:
-        share: How much of the box the 95 % region is.
-        holds: Whether the truth is in it; None where that is not known.
-        intervals_hold: For each parameter of the box, whether its 95 % interval holds the truth; None as above.
-        p_value: How likely a proxy that fits is to be as far from the target; None with too few points to tell.
-        fits: Whether the proxy may have made the target; None as above.
-    """
-
-    share: float
-    holds: bool | None
+    share: float  # how much of the box the 95 % region is
+    holds: bool | None  # whether the truth is in it; None where that is not known
+    # for each parameter of the box, whether its 95 % interval holds the truth; None as above
     intervals_hold: Mapping[str, bool] | None
+    # how likely a proxy that fits is to be as far from the target; None with too few points to tell
     p_value: float | None
-    fits: bool | None
+    fits: bool | None  # whether the proxy may have made the target; None as above
 
 
 @dataclass(frozen=True)
 class Judgement:
-    """What an engine achieved.
+    """What an engine achieved."""
 
-    Attributes:
-        regrets: Regret of every visited point, in order, or of one no better than those before it a figure that is no
-            less than theirs; None where the trial failed.
-        answer: The visited point that a study would report.
-        answer_score: Its score, free of the noise that the engine has seen; None where it failed.
-        answer_regret: Its regret, free of that noise; None where it failed.
-        error: Its distance from the truth in widths of the box, None where truth is not known.
-        reading: What the points tell of the truth; None where a score has no parts.
-        code: Digest of the code that judged.
-    """
-
+    # regret of every visited point, in order, or of one no better than those before it a figure that is no less
+    # than theirs; None where the trial failed
     regrets: tuple[float | None, ...]
-    answer: Values
-    answer_score: float | None
-    answer_regret: float | None
-    error: float | None
-    reading: Reading | None
-    code: str
+    answer: Values  # the visited point that a study would report
+    answer_score: float | None  # its score, free of the noise that the engine has seen; None where it failed
+    answer_regret: float | None  # its regret, free of that noise; None where it failed
+    error: float | None  # its distance from the truth in widths of the box, None where truth is not known
+    reading: Reading | None  # what the points tell of the truth; None where a score has no parts
+    code: str  # digest of the code that judged
 
     @property
     def best_regrets(self) -> tuple[float, ...]:

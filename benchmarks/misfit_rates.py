@@ -60,17 +60,11 @@ FEW, TOGETHER = 24, 10
 
 @dataclass(frozen=True)
 class Place:
-    """Where targets are driven.
+    """Where targets are driven."""
 
-    Attributes:
-        study: The bank.
-        output: The folder that keeps what was driven.
-        part: Which part of the truths.
-    """
-
-    study: Study
-    output: Path
-    part: str
+    study: Study  # the bank
+    output: Path  # the folder that keeps what was driven
+    part: str  # which part of the truths
 
     def truth(self, number: int) -> Values:
         """The θ* of a number."""
@@ -115,23 +109,14 @@ class Place:
 
 @dataclass(frozen=True)
 class Told:
-    """What trials say of one target.
+    """What trials say of one target."""
 
-    Attributes:
-        effect: What it has and the proxy lacks, and its size; empty for nothing.
-        p_value: Of the misfit.
-        fits: Whether some θ may explain the target.
-        held: Whether the 95 % region holds θ*.
-        share: The region's share of the box.
-        narrow: Whether it would hold θ* if a misfit did not make it wider.
-    """
-
-    effect: tuple[str, str]
-    p_value: float
-    fits: bool
-    held: bool
-    share: float
-    narrow: bool
+    effect: tuple[str, str]  # what it has and the proxy lacks, and its size; empty for nothing
+    p_value: float  # of the misfit
+    fits: bool  # whether some θ may explain the target
+    held: bool  # whether the 95 % region holds θ*
+    share: float  # the region's share of the box
+    narrow: bool  # whether it would hold θ* if a misfit did not make it wider
 
 
 def changes(place: Place) -> dict[tuple[str, str, int], tuple[float, float]]:

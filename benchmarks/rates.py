@@ -113,35 +113,21 @@ FLAGGED = ("partly explained", "unexplained")
 
 @dataclass(frozen=True)
 class Row:
-    """What was said of a case.
+    """What was said of a case."""
 
-    Attributes:
-        job: The case.
-        verdict: The verdict.
-        adopted: The effects that were added, each with its rivals.
-        depends_on: Signals that explain the rest.
-        evidence: Of the hidden effects, that of the weakest [nats]; the best of all effects where none is hidden.
-        before: Error with what is declared [m].
-        after: Error with what was added [m].
-        learnt: Error with what was learnt besides [m], NaN where nothing is.
-        true: Error of the model that is right [m], NaN where there is none.
-        floor: The noise floor that was told, its lower and upper end [m].
-        immaterial: Effects that were found and do not matter.
-        problem: What went wrong, empty as a rule.
-    """
-
-    job: Job
-    verdict: str
-    adopted: tuple[tuple[str, ...], ...] = ()
-    depends_on: tuple[str, ...] = ()
+    job: Job  # the case
+    verdict: str  # the verdict
+    adopted: tuple[tuple[str, ...], ...] = ()  # the effects that were added, each with its rivals
+    depends_on: tuple[str, ...] = ()  # signals that explain the rest
+    # of the hidden effects, that of the weakest [nats]; the best of all effects where none is hidden
     evidence: float = 0.0
-    before: float = np.nan
-    after: float = np.nan
-    learnt: float = np.nan
-    true: float = np.nan
-    floor: tuple[float, float] = (np.nan, np.nan)
-    immaterial: tuple[str, ...] = ()
-    problem: str = ""
+    before: float = np.nan  # error with what is declared [m]
+    after: float = np.nan  # error with what was added [m]
+    learnt: float = np.nan  # error with what was learnt besides [m], NaN where nothing is
+    true: float = np.nan  # error of the model that is right [m], NaN where there is none
+    floor: tuple[float, float] = (np.nan, np.nan)  # the noise floor that was told, its lower and upper end [m]
+    immaterial: tuple[str, ...] = ()  # effects that were found and do not matter
+    problem: str = ""  # what went wrong, empty as a rule
 
     @property
     def flagged(self) -> bool:

@@ -208,21 +208,13 @@ class Place(Protocol):
 
 @dataclass(frozen=True)
 class Part:
-    """What is asked of both checkouts, independent of all other parts.
+    """What is asked of both checkouts, independent of all other parts."""
 
-    Attributes:
-        name: What it is called.
-        ask: Runs its commands in a place.
-        needs: Modules that must be installed.
-        tables: Whether score tables must be given.
-        leaves_out: Paths of answers that differ by nature, as a regular expression.
-    """
-
-    name: str
-    ask: Callable[[Place], None]
-    needs: tuple[str, ...] = ()
-    tables: bool = False
-    leaves_out: str = "^$"
+    name: str  # what it is called
+    ask: Callable[[Place], None]  # runs its commands in a place
+    needs: tuple[str, ...] = ()  # modules that must be installed
+    tables: bool = False  # whether score tables must be given
+    leaves_out: str = "^$"  # paths of answers that differ by nature, as a regular expression
 
     @property
     def version(self) -> str:

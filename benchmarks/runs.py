@@ -23,40 +23,24 @@ LEVELS = (2.5, 97.5)
 
 @dataclass(frozen=True)
 class RunKey:
-    """What a run is a function of.
+    """What a run is a function of."""
 
-    Attributes:
-        objective: Identity of the objective.
-        engine: Name of the engine.
-        seed: The instance of the problem, its noise, the design, and what the engine draws.
-        budget: How many evaluations.
-        initial: How many of them are the design, which all engines share.
-        code: Digest of the code that the engine's proposals depend on.
-    """
-
-    objective: str
-    engine: str
-    seed: int
-    budget: int
-    initial: int
-    code: str
+    objective: str  # identity of the objective
+    engine: str  # name of the engine
+    seed: int  # the instance of the problem, its noise, the design, and what the engine draws
+    budget: int  # how many evaluations
+    initial: int  # how many of them are the design, which all engines share
+    code: str  # digest of the code that the engine's proposals depend on
 
 
 @dataclass(frozen=True)
 class Run:
-    """What an engine did, and what that is worth.
+    """What an engine did, and what that is worth."""
 
-    Attributes:
-        key: Which run it was.
-        visited: The points in order.
-        seconds: Mean time per proposal after the design.
-        judgement: What they are worth.
-    """
-
-    key: RunKey
-    visited: tuple[Values, ...]
-    seconds: float
-    judgement: Judgement
+    key: RunKey  # which run it was
+    visited: tuple[Values, ...]  # the points in order
+    seconds: float  # mean time per proposal after the design
+    judgement: Judgement  # what they are worth
 
 
 def run_engine(objective: Objective, key: RunKey, engine: Engine) -> Run:
@@ -188,59 +172,37 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Region:
-    """What the points of an engine's runs tell of θ, read as a study reads them.
+    """What the points of an engine's runs tell of θ, read as a study reads them."""
 
-    Attributes:
-        covered: In how many runs the truth is in the 95 % region; None where it is not known.
-        share: Median share of the region in the box.
-        intervals_covered: For each parameter, in how many runs its 95 % interval holds the truth; None as above.
-        misfits: In how many runs it was said that the proxy lacks something.
-    """
-
-    covered: int | None
-    share: Estimate
+    covered: int | None  # in how many runs the truth is in the 95 % region; None where it is not known
+    share: Estimate  # median share of the region in the box
+    # for each parameter, in how many runs its 95 % interval holds the truth; None as above
     intervals_covered: Mapping[str, int] | None
-    misfits: int
+    misfits: int  # in how many runs it was said that the proxy lacks something
 
 
 @dataclass(frozen=True)
 class EngineSummary:
-    """An engine over all its seeds. Differences and ratios are to the first engine, seed by seed; None for itself.
+    """An engine over all its seeds. Differences and ratios are to the first engine, seed by seed; None for itself."""
 
-    Attributes:
-        engine: Its name.
-        seeds: How many runs.
-        score: Mean score of the answers, free of the noise that the engine has seen; None if all failed.
-        of_truth: That over the truths' own mean score of the same fresh episodes; None where truth is not known, or
-            scores nothing.
-        regret_difference: How much higher that is on average; the regret is higher by as much.
-        regret: Median regret of the answer.
-        reached: In how many runs a visited point was within the noise floor, or no worse than the truth.
-        evaluations: Median number of evaluations to get there; a run that did not counts as one more than the budget.
-        saved: Mean number of evaluations by which the first gets there sooner.
-        ratio: Mean number of evaluations of the first, as a share of this engine's.
-        simulated: Mean simulated seconds to get there, counted likewise; None where nothing is simulated.
-        error: Median error of θ in widths of the box; None where truth is not known.
-        error_difference: How much larger that is on average.
-        region: What its points tell of θ; None where a score has no parts.
-        seconds: Median time per proposal.
-    """
-
-    engine: str
-    seeds: int
-    score: Estimate | None
+    engine: str  # its name
+    seeds: int  # how many runs
+    score: Estimate | None  # mean score of the answers, free of the noise that the engine has seen; None if all failed
+    # that over the truths' own mean score of the same fresh episodes; None where truth is not known, or scores
+    # nothing
     of_truth: Estimate | None
-    regret_difference: Estimate | None
-    regret: Estimate
-    reached: int
+    regret_difference: Estimate | None  # how much higher that is on average; the regret is higher by as much
+    regret: Estimate  # median regret of the answer
+    reached: int  # in how many runs a visited point was within the noise floor, or no worse than the truth
+    # median number of evaluations to get there; a run that did not counts as one more than the budget
     evaluations: Estimate
-    saved: Estimate | None
-    ratio: Estimate | None
-    simulated: Estimate | None
-    error: Estimate | None
-    error_difference: Estimate | None
-    region: Region | None
-    seconds: float
+    saved: Estimate | None  # mean number of evaluations by which the first gets there sooner
+    ratio: Estimate | None  # mean number of evaluations of the first, as a share of this engine's
+    simulated: Estimate | None  # mean simulated seconds to get there, counted likewise; None where nothing is simulated
+    error: Estimate | None  # median error of θ in widths of the box; None where truth is not known
+    error_difference: Estimate | None  # how much larger that is on average
+    region: Region | None  # what its points tell of θ; None where a score has no parts
+    seconds: float  # median time per proposal
 
 
 def summarise(

@@ -41,27 +41,16 @@ PLAIN: Figures = {
 
 @dataclass(frozen=True)
 class Case:
-    """A car that one log is measured of.
+    """A car that one log is measured of."""
 
-    Attributes:
-        name: What it is.
-        changed: Figures of PLAIN that are others.
-        noise: Its size: "normal" or "small".
-        seed: Of the drives and of everything random.
-        offset: Of its steering, as a share of full lock.
-        delay: Its delay [s].
-        right: For every hidden effect, the catalogue's names that count as right.
-        depends_on: What an effect outside of the catalogue depends on.
-    """
-
-    name: str
-    changed: tuple[tuple[str, float], ...]
-    noise: str
-    seed: int
-    offset: float
-    delay: float
-    right: tuple[tuple[str, ...], ...] = ()
-    depends_on: str = ""
+    name: str  # what it is
+    changed: tuple[tuple[str, float], ...]  # figures of PLAIN that are others
+    noise: str  # its size: "normal" or "small"
+    seed: int  # of the drives and of everything random
+    offset: float  # of its steering, as a share of full lock
+    delay: float  # its delay [s]
+    right: tuple[tuple[str, ...], ...] = ()  # for every hidden effect, the catalogue's names that count as right
+    depends_on: str = ""  # what an effect outside of the catalogue depends on
 
     @property
     def figures(self) -> Figures:

@@ -65,29 +65,17 @@ Segment = Callable[[Random, int], Array]
 
 @dataclass(frozen=True)
 class Case:
-    """A robot that one log is measured of.
+    """A robot that one log is measured of."""
 
-    Attributes:
-        name: What it is.
-        effects: What is hidden: names in the tables of effects with their figures.
-        noise: One of NOISES.
-        seed: Seed of the drives and of everything random.
-        trim: Its trim.
-        delay: Its delay [s], a multiple of 5 ms.
-        right: For every hidden effect, the catalogue's names that count as right.
-        depends_on: What an effect outside of the catalogue depends on.
-        integration: "exact" in steps of 2.5 ms, or "coarse": Euler's rule in steps of 5 ms.
-    """
-
-    name: str
-    effects: tuple[Hidden, ...]
-    noise: str
-    seed: int
-    trim: float
-    delay: float
-    right: tuple[tuple[str, ...], ...] = ()
-    depends_on: str = ""
-    integration: str = "exact"
+    name: str  # what it is
+    effects: tuple[Hidden, ...]  # what is hidden: names in the tables of effects with their figures
+    noise: str  # one of NOISES
+    seed: int  # seed of the drives and of everything random
+    trim: float  # its trim
+    delay: float  # its delay [s], a multiple of 5 ms
+    right: tuple[tuple[str, ...], ...] = ()  # for every hidden effect, the catalogue's names that count as right
+    depends_on: str = ""  # what an effect outside of the catalogue depends on
+    integration: str = "exact"  # "exact" in steps of 2.5 ms, or "coarse": Euler's rule in steps of 5 ms
 
 
 def _case(

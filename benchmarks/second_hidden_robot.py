@@ -20,19 +20,12 @@ Table = Mapping[str, Effect]
 
 
 class Run(NamedTuple):
-    """What an effect may look at.
+    """What an effect may look at."""
 
-    Attributes:
-        random: Random numbers of its own.
-        step_s: Length of a step [s].
-        exact: Whether a step is integrated exactly, or by Euler's rule from its beginning.
-        duties: Duties in force (E, T, 2); before they arrive, those that were sent (E, rows, 2).
-    """
-
-    random: np.random.Generator
-    step_s: float
-    exact: bool
-    duties: Array
+    random: np.random.Generator  # random numbers of its own
+    step_s: float  # length of a step [s]
+    exact: bool  # whether a step is integrated exactly, or by Euler's rule from its beginning
+    duties: Array  # duties in force (E, T, 2); before they arrive, those that were sent (E, rows, 2)
 
     @property
     def times(self) -> Array:

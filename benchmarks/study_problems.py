@@ -34,17 +34,12 @@ class StudyObjective:
     """PRPV of a study.
 
     Regret is PRPV above the target's noise floor: the optimum is not known.
-
-    Attributes:
-        run: The study, whose episodes are simulated when first asked for.
-        floor: The target's noise floor, 0 where its episodes do not tell.
-        tolerance: A regret not above this cannot be told from none.
-        runs: The same study by seed, as they were first asked for.
     """
 
-    run: StudyRun
-    floor: float
-    tolerance: float = 0.0
+    run: StudyRun  # the study, whose episodes are simulated when first asked for
+    floor: float  # the target's noise floor, 0 where its episodes do not tell
+    tolerance: float = 0.0  # a regret not above this cannot be told from none
+    # the same study by seed, as they were first asked for
     runs: dict[int, StudyRun] = field(default_factory=dict, compare=False, repr=False)
 
     @property
@@ -139,18 +134,14 @@ class TruthObjective:
 
     Regret is PRPV above the truth's own: that of θ* in the proxy, the mean of the seed's and of fresh episodes. A
     visited point that seems no worse is driven again in fresh episodes, so that it has to be lucky twice.
-
-    Attributes:
-        run: The study; its own target is not looked at.
-        lacking: What targets are measured in, one after the other by seed, if not in the proxy itself: families that
-            have effects which the proxy lacks.
-        tolerance: A regret not above this cannot be told from none.
-        objectives: The study against each seed's target, as they were first asked for.
     """
 
-    run: StudyRun
+    run: StudyRun  # the study; its own target is not looked at
+    # what targets are measured in, one after the other by seed, if not in the proxy itself: families that have
+    # effects which the proxy lacks
     lacking: tuple[DomainFamily, ...] = ()
-    tolerance: float = 0.0
+    tolerance: float = 0.0  # a regret not above this cannot be told from none
+    # the study against each seed's target, as they were first asked for
     objectives: dict[int, StudyObjective] = field(default_factory=dict, compare=False, repr=False)
 
     @property

@@ -101,37 +101,21 @@ TAPE = {"5mm_tape": 0.005, "20mm_tape": 0.02}
 
 @dataclass(frozen=True)
 class Case:
-    """A case with everything that is not drawn frame by frame.
+    """A case with everything that is not drawn frame by frame."""
 
-    Attributes:
-        name: As it was asked for.
-        seed: Of all that is random.
-        effects: What is wrong with the camera, by the names of CHANGES.
-        sight: The camera.
-        moves: Whether the frames are of drives.
-        road: Name of the map.
-        tape_m: How far lines lie from their places [m]: standard deviation, or the largest for 20 mm.
-        scatter: Of measured poses, key of POSES.
-        plain: Whether the floor is drawn as the package draws it.
-        walls: Whether there are walls above the horizon, or the sky.
-        fixed: Whether all frames are exposed alike.
-        quality: Of JPEG, 0 for PNG.
-        noise: Of the sensor, whatever the case [grey levels].
-    """
-
-    name: str
-    seed: int
-    effects: tuple[str, ...]
-    sight: Sight
-    moves: bool
-    road: str
-    tape_m: float
-    scatter: str
-    plain: bool
-    walls: bool
-    fixed: bool
-    quality: int
-    noise: float
+    name: str  # as it was asked for
+    seed: int  # of all that is random
+    effects: tuple[str, ...]  # what is wrong with the camera, by the names of CHANGES
+    sight: Sight  # the camera
+    moves: bool  # whether the frames are of drives
+    road: str  # name of the map
+    tape_m: float  # how far lines lie from their places [m]: standard deviation, or the largest for 20 mm
+    scatter: str  # of measured poses, key of POSES
+    plain: bool  # whether the floor is drawn as the package draws it
+    walls: bool  # whether there are walls above the horizon, or the sky
+    fixed: bool  # whether all frames are exposed alike
+    quality: int  # of JPEG, 0 for PNG
+    noise: float  # of the sensor, whatever the case [grey levels]
 
     @property
     def seeds(self) -> np.random.SeedSequence:

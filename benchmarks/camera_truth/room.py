@@ -12,19 +12,12 @@ Values = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Room:
-    """A panorama that is far away.
+    """A panorama that is far away."""
 
-    Attributes:
-        colour: Its mean colour.
-        swing: How much brighter and darker it gets round the horizon, by harmonic (n,) as a share.
-        phase: Where, by harmonic (n,) [rad].
-        climb: How much brighter it gets with every radian upwards, as a share.
-    """
-
-    colour: Values
-    swing: Values
-    phase: Values
-    climb: float
+    colour: Values  # its mean colour
+    swing: Values  # how much brighter and darker it gets round the horizon, by harmonic (n,) as a share
+    phase: Values  # where, by harmonic (n,) [rad]
+    climb: float  # how much brighter it gets with every radian upwards, as a share
 
     def seen(self, directions: Values, heading: float) -> Values:
         """Colours (…, 3) in directions (…, 3) of a robot with this heading [rad]."""

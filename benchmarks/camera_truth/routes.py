@@ -22,17 +22,11 @@ LEAD_S = 0.25
 
 @dataclass(frozen=True)
 class Drive:
-    """One drive.
+    """One drive."""
 
-    Attributes:
-        frames: Times of its frames (n,) [s].
-        duties: Left and right at 20 Hz, each held until the next (m, 2).
-        poses: True ones, FINE_HZ a second, from time 0 on (k, 3).
-    """
-
-    frames: Values
-    duties: Values
-    poses: Values
+    frames: Values  # times of its frames (n,) [s]
+    duties: Values  # left and right at 20 Hz, each held until the next (m, 2)
+    poses: Values  # true ones, FINE_HZ a second, from time 0 on (k, 3)
 
     @property
     def rows(self) -> Values:

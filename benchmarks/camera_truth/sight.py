@@ -21,17 +21,12 @@ DECLARED = ("camera_pitch", "blur")
 
 @dataclass(frozen=True)
 class Bend:
-    """How a lens bends that no catalogue has.
+    """How a lens bends that no catalogue has."""
 
-    Attributes:
-        form: Key of lens.BENDS.
-        size_px: How far it moves the points of the picture's lower half: all but a twentieth less than this [pixel].
-        turn_rad: Phase of the waves, or direction of what has one [rad].
-    """
-
-    form: str
+    form: str  # key of lens.BENDS
+    # how far it moves the points of the picture's lower half: all but a twentieth less than this [pixel]
     size_px: float
-    turn_rad: float
+    turn_rad: float  # phase of the waves, or direction of what has one [rad]
 
 
 @dataclass(frozen=True)

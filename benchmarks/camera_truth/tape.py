@@ -20,21 +20,13 @@ DASH_PER_GAP = 2.0
 
 @dataclass(frozen=True)
 class Tape:
-    """What is wrong with the lines, tile by tile.
+    """What is wrong with the lines, tile by tile."""
 
-    Attributes:
-        shift: To the right of where the map has them (3, tiles) [m].
-        askew: Growth of that along the tile (3, tiles).
-        wider: What their widths have in excess (3, tiles) [m].
-        dash_shift: Of every dash along the line (tiles, MOST_DASHES) [m].
-        dash_longer: Its length over nominal, less 1 (tiles, MOST_DASHES).
-    """
-
-    shift: Values
-    askew: Values
-    wider: Values
-    dash_shift: Values
-    dash_longer: Values
+    shift: Values  # to the right of where the map has them (3, tiles) [m]
+    askew: Values  # growth of that along the tile (3, tiles)
+    wider: Values  # what their widths have in excess (3, tiles) [m]
+    dash_shift: Values  # of every dash along the line (tiles, MOST_DASHES) [m]
+    dash_longer: Values  # its length over nominal, less 1 (tiles, MOST_DASHES)
 
 
 def straight_tape(road: Road) -> Tape:

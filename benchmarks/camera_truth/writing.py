@@ -27,31 +27,18 @@ Values = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Truth:
-    """What is true of a set.
+    """What is true of a set."""
 
-    Attributes:
-        case: Its name.
-        seed: Its seed.
-        effects: What is wrong with the camera, outside effects among it.
-        theta: Figures that differ from nominal, by the names of parameters.
-        figures: All figures.
-        outside: What no catalogue has.
-        position_m: Scatter of measured places [m].
-        heading_deg: Scatter of measured headings [deg].
-        tape_m: How far lines lie from their places [m]: standard deviation, or the largest for 0.02.
-        scene: How the set was taken, for looking at results by it.
-    """
-
-    case: str
-    seed: int
-    effects: tuple[str, ...]
-    theta: Mapping[str, float]
-    figures: Mapping[str, float]
-    outside: Mapping[str, Any]
-    position_m: float
-    heading_deg: float
-    tape_m: float
-    scene: Mapping[str, Any]
+    case: str  # its name
+    seed: int  # its seed
+    effects: tuple[str, ...]  # what is wrong with the camera, outside effects among it
+    theta: Mapping[str, float]  # figures that differ from nominal, by the names of parameters
+    figures: Mapping[str, float]  # all figures
+    outside: Mapping[str, Any]  # what no catalogue has
+    position_m: float  # scatter of measured places [m]
+    heading_deg: float  # scatter of measured headings [deg]
+    tape_m: float  # how far lines lie from their places [m]: standard deviation, or the largest for 0.02
+    scene: Mapping[str, Any]  # how the set was taken, for looking at results by it
 
 
 def write_set(folder: Path, case: str, seed: int) -> Truth:

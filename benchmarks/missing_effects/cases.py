@@ -29,19 +29,12 @@ class FormatError(Exception):
 
 @dataclass(frozen=True)
 class Drive:
-    """One drive of a robot, its rows evenly spaced in time.
+    """One drive of a robot, its rows evenly spaced in time."""
 
-    Attributes:
-        name: What it is called.
-        times: Of the rows (T,) [s].
-        commands: In the units of the log (T, 2), each held until the next.
-        poses: As the tracker measured them (T, 3) [m], [m], [rad]; NaN where they are not told.
-    """
-
-    name: str
-    times: Array
-    commands: Array
-    poses: Array
+    name: str  # what it is called
+    times: Array  # of the rows (T,) [s]
+    commands: Array  # in the units of the log (T, 2), each held until the next
+    poses: Array  # as the tracker measured them (T, 3) [m], [m], [rad]; NaN where they are not told
 
     @property
     def row_s(self) -> float:
@@ -51,21 +44,13 @@ class Drive:
 
 @dataclass(frozen=True)
 class Case:
-    """What an entry may know of a robot.
+    """What an entry may know of a robot."""
 
-    Attributes:
-        name: Name of its folder.
-        folder: The folder.
-        robot: Its figures as its maker states them, and the kind of its commands.
-        drives: Drives with commands and poses, to learn from.
-        held_out: Drives with commands and the first pose only, to predict.
-    """
-
-    name: str
-    folder: Path
-    robot: Mapping[str, Any]
-    drives: tuple[Drive, ...]
-    held_out: tuple[Drive, ...]
+    name: str  # name of its folder
+    folder: Path  # the folder
+    robot: Mapping[str, Any]  # its figures as its maker states them, and the kind of its commands
+    drives: tuple[Drive, ...]  # drives with commands and poses, to learn from
+    held_out: tuple[Drive, ...]  # drives with commands and the first pose only, to predict
 
 
 def case_folders(folder: Path) -> tuple[Path, ...]:

@@ -23,42 +23,26 @@ SAME_TIME_S = 1e-3
 
 @dataclass(frozen=True)
 class Truth:
-    """What no entry may know of a case.
+    """What no entry may know of a case."""
 
-    Attributes:
-        name: The case.
-        kind: One of KINDS.
-        missing: For every missing effect the names that count as right.
-        known: All names of the catalogue.
-        drives: Times (T,) [s] and measured poses (T, 3) of the held-out drives.
-        floor: Error of the hidden robot itself, undisturbed, by horizon [m]; None where it draws by lot.
-    """
-
-    name: str
-    kind: str
-    missing: tuple[frozenset[str], ...]
-    known: frozenset[str]
-    drives: Mapping[str, tuple[Array, Array]]
+    name: str  # the case
+    kind: str  # one of KINDS
+    missing: tuple[frozenset[str], ...]  # for every missing effect the names that count as right
+    known: frozenset[str]  # all names of the catalogue
+    drives: Mapping[str, tuple[Array, Array]]  # times (T,) [s] and measured poses (T, 3) of the held-out drives
+    # error of the hidden robot itself, undisturbed, by horizon [m]; None where it draws by lot
     floor: Mapping[str, float] | None
 
 
 @dataclass(frozen=True)
 class Result:
-    """What an entry is worth in one case.
+    """What an entry is worth in one case."""
 
-    Attributes:
-        truth: The case.
-        named: How many missing effects it names; None where it names no effects.
-        false: How many names are of effects that are not missing; None likewise.
-        ratios: Error by floor, for each horizon; None where there is no floor.
-        seconds: Processor time; None where it is not told.
-    """
-
-    truth: Truth
-    named: int | None
-    false: int | None
-    ratios: Mapping[int, float] | None
-    seconds: float | None
+    truth: Truth  # the case
+    named: int | None  # how many missing effects it names; None where it names no effects
+    false: int | None  # how many names are of effects that are not missing; None likewise
+    ratios: Mapping[int, float] | None  # error by floor, for each horizon; None where there is no floor
+    seconds: float | None  # processor time; None where it is not told
 
 
 def read_truths(folder: Path) -> tuple[Truth, ...]:

@@ -36,19 +36,12 @@ EPOCH_S = 1_700_000_000.0
 
 @dataclass(frozen=True)
 class Recording:
-    """One drive as it was recorded.
+    """One drive as it was recorded."""
 
-    Attributes:
-        issued: Stamps of the commands (M,) [s].
-        twists: Commands (M, 2) [m/s, rad/s].
-        measured: Stamps of the poses (N,) [s], by the tracker's clock.
-        poses: x, y [m], heading [rad] (N, 3).
-    """
-
-    issued: np.ndarray
-    twists: np.ndarray
-    measured: np.ndarray
-    poses: np.ndarray
+    issued: np.ndarray  # stamps of the commands (M,) [s]
+    twists: np.ndarray  # commands (M, 2) [m/s, rad/s]
+    measured: np.ndarray  # stamps of the poses (N,) [s], by the tracker's clock
+    poses: np.ndarray  # x, y [m], heading [rad] (N, 3)
 
 
 def drive(seed: int, *, seconds: float = 50.0, offset_s: float = 0.0) -> Recording:

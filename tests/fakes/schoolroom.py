@@ -25,17 +25,11 @@ def answers(theta: Mapping[str, float]) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Schoolroom(Walled):
-    """Wobbly, and an expert in it.
+    """Wobbly, and an expert in it."""
 
-    Attributes:
-        inner: Scores the agents.
-        blocked: Share of a lesson that the expert is off the road.
-        journal: A file to which each lesson and examination adds a line; empty for none.
-    """
-
-    inner: Wobbly
-    blocked: float = 0.0
-    journal: str = ""
+    inner: Wobbly  # scores the agents
+    blocked: float = 0.0  # share of a lesson that the expert is off the road
+    journal: str = ""  # a file to which each lesson and examination adds a line; empty for none
 
     @property
     def identity(self) -> str:

@@ -21,17 +21,11 @@ FALLEN = 1.0
 
 @dataclass(frozen=True)
 class Tightrope(Walled):
-    """Wobbly, with a deviation that grows by a third per step unless a command counters it.
+    """Wobbly, with a deviation that grows by a third per step unless a command counters it."""
 
-    Attributes:
-        inner: Scores the agents.
-        silent: Whether the expert has no label for what a learner visits.
-        journal: A file to which each lesson and examination adds a line; empty for none.
-    """
-
-    inner: Wobbly
-    silent: bool = False
-    journal: str = ""
+    inner: Wobbly  # scores the agents
+    silent: bool = False  # whether the expert has no label for what a learner visits
+    journal: str = ""  # a file to which each lesson and examination adds a line; empty for none
 
     @property
     def identity(self) -> str:

@@ -44,21 +44,13 @@ ENDINGS: Mapping[str, Callable[[], object]] = {
 
 @dataclass(frozen=True)
 class Wobbly:
-    """Agents that like different values of trim and delay, and do worse the further off they are.
+    """Agents that like different values of trim and delay, and do worse the further off they are."""
 
-    Attributes:
-        theta: The values of an instance where the episode does not name them.
-        sleep: Seconds an episode takes.
-        faults: What goes wrong, as "agent:start:fault"; a start of * means every one.
-        journal: A file to which each simulated episode adds a line; empty for none.
-        version: Stands for the code's version.
-    """
-
-    theta: tuple[tuple[str, float], ...] = ()
-    sleep: float = 0.0
-    faults: tuple[str, ...] = ()
-    journal: str = ""
-    version: str = "1"
+    theta: tuple[tuple[str, float], ...] = ()  # the values of an instance where the episode does not name them
+    sleep: float = 0.0  # seconds an episode takes
+    faults: tuple[str, ...] = ()  # what goes wrong, as "agent:start:fault"; a start of * means every one
+    journal: str = ""  # a file to which each simulated episode adds a line; empty for none
+    version: str = "1"  # stands for the code's version
 
     @property
     def identity(self) -> str:

@@ -52,6 +52,7 @@ def away(one, other):
     return float(np.abs(one - other).sum())
 
 
+@pytest.mark.slow
 def test_a_truth_is_driven_afresh_beside_the_answer_of_its_study_and_nothing_twice(small, make_study, tmp_path):
     journal = tmp_path / "journal"
     agents = '["agent0", "agent1", "agent2", "agent3"]'

@@ -25,7 +25,7 @@ class BulletCase:
     name: str  # what it is
     changes: Mapping[str, float]  # names of CHANGES, or "left_wheel", each with its size
     seed: int  # seed of the manoeuvres and of the noise
-    trim: float = 0.04  # its trim
+    trim: float = 0.04
     delay: float = 0.12  # its delay [s]
     noise: str = "normal"  # key of LEVELS
 

@@ -38,7 +38,7 @@ class Case:
     effects: tuple[tuple[str, Figures], ...]  # what is hidden: names of functions here with their figures
     noise: str  # key of LEVELS
     seed: int  # seed of the manoeuvres and of everything random
-    trim: float  # its trim
+    trim: float
     delay: float  # its delay [s]
     right: tuple[tuple[str, ...], ...] = ()  # for every hidden effect, the catalogue's names that count as right
     depends_on: str = ""  # the signal that an effect outside of any catalogue depends on

@@ -116,7 +116,7 @@ class Row:
     """What was said of a case."""
 
     job: Job  # the case
-    verdict: str  # the verdict
+    verdict: str
     adopted: tuple[tuple[str, ...], ...] = ()  # the effects that were added, each with its rivals
     depends_on: tuple[str, ...] = ()  # signals that explain the rest
     # of the hidden effects, that of the weakest [nats]; the best of all effects where none is hidden

@@ -71,7 +71,7 @@ class Case:
     effects: tuple[Hidden, ...]  # what is hidden: names in the tables of effects with their figures
     noise: str  # one of NOISES
     seed: int  # seed of the drives and of everything random
-    trim: float  # its trim
+    trim: float
     delay: float  # its delay [s], a multiple of 5 ms
     right: tuple[tuple[str, ...], ...] = ()  # for every hidden effect, the catalogue's names that count as right
     depends_on: str = ""  # what an effect outside of the catalogue depends on

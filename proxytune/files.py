@@ -15,9 +15,11 @@ import platform
 import shutil
 import tempfile
 import time
+import tomllib
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from string import Template
+from typing import Any
 
 from proxytune.errors import InputError, SettingsError
 
@@ -209,6 +211,11 @@ def csv_text(columns: Sequence[str], rows: Iterable[Sequence[str | float | None]
     text = io.StringIO()
     csv.writer(text, lineterminator="\n").writerows([columns, *rows])
     return text.getvalue()
+
+
+def package_table(name: str) -> dict[str, Any]:
+    """A TOML file of the package, by its place in it."""
+    return tomllib.loads((Path(__file__).parent / name).read_text(encoding="utf-8"))
 
 
 def fill_template(room: str, template: str, /, **values: object) -> str:

@@ -14,15 +14,15 @@ This module lies outside those rooms, so that what is said here is no part of wh
 """
 
 import functools
-import tomllib
 from pathlib import Path
 
+from proxytune.files import package_table
 from proxytune.identity import meaning_of
 
 PACKAGE = Path(__file__).resolve().parent
 ROOMS = {"driving": ("effects", "driving"), "environments": ("effects", "environments")}
 """Where the code lies that plays the episodes of a family: every module of these rooms counts."""
-_ENTRIES = tomllib.loads((PACKAGE / "lineage.toml").read_text(encoding="utf-8"))
+_ENTRIES = package_table("lineage.toml")
 _SHARED = _ENTRIES.pop("shared")
 SAME_CODE = {
     entry: tuple(one for code in codes for one in _SHARED.get(code, (code,))) for entry, codes in _ENTRIES.items()

@@ -186,7 +186,7 @@ class SweepCurve:
     """Usefulness along one parameter."""
 
     parameter: str  # its name
-    unit: str  # its unit
+    unit: str
     base: Theta  # what the other parameters are held at; those not named are nominal
     metrics: tuple[str, ...]  # how agents are compared
     points: tuple[SweepPoint, ...]  # in rising order of the parameter

@@ -30,7 +30,7 @@ class Truth:
     """What is true of a set."""
 
     case: str  # its name
-    seed: int  # its seed
+    seed: int
     effects: tuple[str, ...]  # what is wrong with the camera, outside effects among it
     theta: Mapping[str, float]  # figures that differ from nominal, by the names of parameters
     figures: Mapping[str, float]  # all figures

@@ -47,7 +47,7 @@ class Case:
     """What an entry may know of a robot."""
 
     name: str  # name of its folder
-    folder: Path  # the folder
+    folder: Path
     robot: Mapping[str, Any]  # its figures as its maker states them, and the kind of its commands
     drives: tuple[Drive, ...]  # drives with commands and poses, to learn from
     held_out: tuple[Drive, ...]  # drives with commands and the first pose only, to predict

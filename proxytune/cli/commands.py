@@ -5,10 +5,11 @@ What it takes is in options.toml, which `add_options` tells a parser.
 
 import argparse
 import importlib
-import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
+
+from proxytune.files import package_table
 
 
 class Command(NamedTuple):
@@ -35,10 +36,7 @@ class Command(NamedTuple):
         return getattr(importlib.import_module(f"proxytune.cli.{module}"), function or "run")
 
 
-TABLES, OPTIONS = (
-    tomllib.loads(Path(__file__).with_name(name).read_text(encoding="utf-8"))
-    for name in ("commands.toml", "options.toml")
-)
+TABLES, OPTIONS = package_table("cli/commands.toml"), package_table("cli/options.toml")
 COMMANDS = {name: Command(**{"module": name, **table}) for name, table in TABLES.items()}
 TYPES: Mapping[str, Callable[[str], object]] = {"int": int, "float": float, "path": Path}
 

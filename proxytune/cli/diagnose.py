@@ -1,7 +1,6 @@
 """`diagnose`: find the effect that the model lacks, from a log of measured drives and frames."""
 
 import argparse
-import tomllib
 from contextlib import nullcontext
 from pathlib import Path
 
@@ -15,12 +14,12 @@ from proxytune.cli.terminal import Answer, Steps
 from proxytune.diagnosis import Limits, diagnose_log, forget_stages, robot_of
 from proxytune.effects import Catalogue
 from proxytune.errors import InputError
-from proxytune.files import check_place
+from proxytune.files import check_place, package_table
 from proxytune.importing import finite, open_log
 from proxytune.logs import Log
 from proxytune.report import diagnosis_text
 
-STEPS: dict[str, dict[str, float]] = tomllib.loads(Path(__file__).with_name("steps.toml").read_text(encoding="utf-8"))
+STEPS: dict[str, dict[str, float]] = package_table("cli/steps.toml")
 MOTION_SHARE = 0.8
 """Of the time of both; the camera comes last."""
 

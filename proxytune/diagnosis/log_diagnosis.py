@@ -35,7 +35,7 @@ class LogDiagnosis:
     """The diagnosis of a robot from a log; at least one part is there."""
 
     log: str  # the log's name
-    robot: Robot  # the robot
+    robot: Robot
     motion: Diagnosis | None  # what its drives say, or None
     camera: CameraDiagnosis | None  # what its frames say, or None
     motion_refused: str = ""  # why its drives say nothing though it has commands and frames, else empty

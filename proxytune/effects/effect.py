@@ -48,7 +48,7 @@ class Panel(NamedTuple):
     """Axes of one panel of a figure."""
 
     signal: str  # along the axis, one of SIGNALS; empty for that of the cue
-    label: str  # its label
+    label: str
     motion: str  # which motion is added, one of MOTIONS
     share: bool = False  # whether as a share of that motion instead of in its unit
 

@@ -96,7 +96,7 @@ class Source:
     """The findings of an importer."""
 
     form: str  # what the source is, as in "ROS 2 bag (mcap)"
-    drives: tuple[Drive, ...]  # its drives
+    drives: tuple[Drive, ...]
     channels: tuple[Channel, ...]  # all that it holds, and what each was taken for
     notes: tuple[str, ...]  # what was decided on the way, a sentence each
     surveys: tuple[Survey, ...] = ()  # the drives in numbers, once their stamps have been checked

@@ -6,7 +6,6 @@ takes "score" for two columns cut at s and a row too long for one with an index,
 
 import codecs
 import csv
-import tomllib
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -18,6 +17,7 @@ from numpy.typing import NDArray
 
 from proxytune.arrays import Floats
 from proxytune.errors import LogError
+from proxytune.files import package_table
 from proxytune.logs import COMMANDS, ENABLED
 from proxytune.settings import table_text
 
@@ -179,7 +179,7 @@ COMMAND_FIELDS = (*(field for pair in COMMANDS.values() for field in pair), ENAB
 
 EXAMPLE = "--columns time=stamp_ns:ns,x=pos_x_mm:mm,y=pos_y_mm:mm,heading=yaw_deg:deg,v=cmd_lin,omega=cmd_ang"
 """A column map, for complaints."""
-FIELDS = tomllib.loads(Path(__file__).with_name("fields.toml").read_text(encoding="utf-8"))
+FIELDS = package_table("importing/fields.toml")
 QUANTITIES: Mapping[str, str] = {field: known["quantity"] for field, known in FIELDS.items()}
 """What each field measures."""
 USUAL = {field: frozenset(known.get("usual", "").split()) for field, known in FIELDS.items()}

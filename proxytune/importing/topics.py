@@ -3,12 +3,12 @@
 A topic is taken by its type, its name and its number of messages, unless the user names it.
 """
 
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from proxytune.errors import LogError
+from proxytune.files import package_table
 from proxytune.importing.bag import COMMAND_TYPES, Topic, bags_in, form_of, open_bag, read_commands, read_poses
 from proxytune.importing.bag_scene import TRANSFORMS, choose_transform, read_chain, read_pictures, read_transforms
 from proxytune.importing.source import Channel, Drive, Source, Wanted
@@ -64,7 +64,7 @@ class Role:
 
 KIND_OF = {name: kind for name, (kind, _) in COMMAND_TYPES.items()} | {short(VESC): "speed_steering"}
 """The kind of command that a type of message says; empty where it says none."""
-ROLES = tomllib.loads(Path(__file__).with_name("roles.toml").read_text(encoding="utf-8"))
+ROLES = package_table("importing/roles.toml")
 COMMAND_ROLE, POSE_ROLE, PICTURE_ROLE = (Role(name, **table) for name, table in ROLES.items())
 
 

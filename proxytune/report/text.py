@@ -1,6 +1,5 @@
 """Views on the terminal, tables without lines with their headings and notes; and tables as files, CSV and LaTeX."""
 
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -13,6 +12,7 @@ from rich.table import Table as TerminalTable
 from rich.text import Text
 
 from proxytune.errors import InputError
+from proxytune.files import package_table
 from proxytune.report.view import Table
 
 GAP = 2
@@ -80,9 +80,7 @@ def group_texts(*parts: RenderableType) -> Group:
 
 
 ENDINGS = (".csv", ".tex")
-IN_LATEX: dict[str, str] = tomllib.loads(
-    (Path(__file__).parent / "templates" / "latex.toml").read_text(encoding="utf-8")
-)
+IN_LATEX: dict[str, str] = package_table("report/templates/latex.toml")
 Cell = str | float | None
 
 

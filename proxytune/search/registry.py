@@ -1,7 +1,7 @@
 """The engines by name, and a digest of the code that the proposals of each depend on.
 
 With code of another digest the next trials of a study may not be those that it would have had: that is told, unless
-proxytune/lineage.py states that the code proposes the same.
+proxytune/lineage.toml states that the code proposes the same.
 """
 
 import ast

@@ -171,7 +171,7 @@ class Diagnosis:
     """The diagnosis of a model of motion, from one log."""
 
     log: str  # the log's name
-    robot: Robot  # the robot
+    robot: Robot
     verdict: str  # "nothing missing", "explained", "partly explained", "unexplained" or "cannot be told"
     declared: Mapping[str, Estimate]  # declared parameters, fitted without any other effect, by name in θ
     theta: Mapping[str, Estimate]  # all parameters of the extended model, by name in θ

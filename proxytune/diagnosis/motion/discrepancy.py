@@ -83,7 +83,7 @@ class Discrepancy:
 class _Task(NamedTuple):
     """What curves are fitted to, and what they begin with."""
 
-    drives: Drives  # the drives
+    drives: Drives
     theta: Theta  # the model that they are added to
     offer: Learnt  # all curves
     moving: Sequence[Coordinate]  # the model's own values that move along

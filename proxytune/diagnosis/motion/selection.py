@@ -14,7 +14,7 @@ of a car hide one another, and some pay together but not one at a time: where a 
 modelled with is fitted together, and what is not sure is taken out (`eliminate`, backward elimination). Evidence
 grows with the length of a log, usefulness does not: `select_effects` then drops the effects that are negligible for
 prediction (`effect_size`), and searches once more without one that did harm while others were chosen beside it.
-Every threshold is one of `rules.Rules`, as the drives carry them.
+Every threshold is one of `diagnosis.Rules`, as the drives carry them.
 """
 
 import math

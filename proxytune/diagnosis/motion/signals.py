@@ -264,7 +264,7 @@ REFITTED = 3
 class SignalCurve(NamedTuple):
     """Curves over one signal, fitted to what a model leaves over."""
 
-    group: SignalGroup  # the group
+    group: SignalGroup
     gain: float  # its gain in log-likelihood on blocks that it was not fitted to [nats]
     weights: Floats  # weight of each of its basis functions
 

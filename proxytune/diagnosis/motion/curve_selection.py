@@ -88,7 +88,9 @@ def choose_groups(given: Sums, groups: Mapping[str, slice], rules: Rules, *, rar
     always = {LEVEL: FREE * unit.get(LEVEL, 0.0), MODEL: MODEL_PULL * mean[groups.get(MODEL, slice(0))]}
     pulls: dict[str, float | Floats] = {name: pull + 1e-9 for name, pull in always.items() if name in groups}
     gains: dict[str, float] = {}
-    held = _hold(given, groups, pulls)
+    held = _hold_nothing(given)
+    for name, pull in pulls.items():
+        held = _hold(given, held, groups[name], pull)
     (losses,) = _held_out_losses(given, held, slice(0), np.zeros(1))
     level = {LEVEL: float((given.size - losses).sum())} if LEVEL in pulls and pays(given.size, losses) else {}
     while True:
@@ -103,34 +105,42 @@ def choose_groups(given: Sums, groups: Mapping[str, slice], rules: Rules, *, rar
             best = min(alike, key=lambda name: float(nested[name].sum()), default=best)
         pulls[best], after = paying[best]
         gains[best] = float((losses - after).sum())
-        losses, held = after, _hold(given, groups, pulls)
+        losses, held = after, _hold(given, held, groups[best], pulls[best])
     weights = np.zeros(len(mean))
-    total = held.own[:, :, held.columns].sum(axis=0) + np.diag(held.penalty)
+    total = held.inside.sum(axis=0) + np.diag(held.penalty)
     weights[held.columns] = np.linalg.solve(total, given.gradient.sum(axis=0)[held.columns])
     return ChosenGroups(weights, gains or level)
 
 
 class _Held(NamedTuple):
-    """Columns held by penalties; their squares with all, each part's own and of others; and what they take of all."""
+    """Columns held by penalties, and what they take of all: solved for once, for all that may come."""
 
-    columns: Whole
-    penalty: Floats
-    own: Floats
-    rest: Floats
-    answer: Floats
+    columns: Whole  # (K,), in the order in which they came
+    penalty: Floats  # (K,)
+    own: Floats  # the squares of each part with all N columns (P, K, N)
+    inside: Floats  # and with each other (P, K, K)
+    rest: Floats  # those of all other parts (P, K, N)
+    answer: Floats  # the weights that take all columns and the errors of all other parts (P, K, N + 1)
 
 
-def _hold(given: Sums, groups: Mapping[str, slice], pulls: Mapping[str, float | Floats]) -> _Held:
-    """Hold the groups that have a pull, or one for each column: they are solved for once, for all that may come."""
-    pulled = np.zeros(given.gradient.shape[1])
-    for name, pull in pulls.items():
-        pulled[groups[name]] = pull
-    columns = np.flatnonzero(pulled)
-    own = np.stack([hessian[columns] for hessian in given.hessian])
+def _hold_nothing(given: Sums) -> _Held:
+    parts, width = given.gradient.shape
+    none = np.empty((parts, 0, width + 1))
+    return _Held(np.arange(0), none[0, :, 0], none[:, :, :-1], none[:, :, :0], none[:, :, :-1], none)
+
+
+def _hold(given: Sums, held: _Held, group: slice, pull: float | Floats) -> _Held:
+    """Hold a group too, with one pull or one for each column; what is held is eliminated by Schur's complement."""
+    own = np.stack([hessian[group] for hessian in given.hessian])
     rest = _of_others(own)
-    right = np.concatenate((rest, _of_others(given.gradient)[:, columns, None]), axis=2)
-    answer = np.linalg.solve(rest[:, :, columns] + np.diag(pulled[columns]), right)
-    return _Held(columns, pulled[columns], own, rest, answer)
+    left = np.concatenate((rest, _of_others(given.gradient)[:, group, None]), axis=2)
+    left -= rest[:, :, held.columns] @ held.answer
+    last = np.linalg.solve(left[:, :, group] + pull * np.eye(own.shape[1]), left)
+    answer = np.concatenate((held.answer - held.answer[:, :, group] @ last, last), axis=1)
+    columns = np.append(held.columns, np.arange(group.start, group.stop))
+    penalty = np.append(held.penalty, np.broadcast_to(pull, own.shape[1]))
+    own, rest = (np.concatenate(two, axis=1) for two in ((held.own, own), (held.rest, rest)))
+    return _Held(columns, penalty, own, own[:, :, columns], rest, answer)
 
 
 def _of_others(own: Floats) -> Floats:
@@ -158,13 +168,13 @@ def _does_as_well(losses: Floats, best: Floats) -> bool:
 
 def _held_out_losses(given: Sums, held: _Held, own: slice, pulls: Floats) -> Floats:
     """The squared error of each part with weights from all others, own columns under each pull (R,): (R, P)."""
-    # What is held already is eliminated by Schur's complement.
     inside = np.stack([hessian[own, own] for hessian in given.hessian])
     across, answer, alone = held.own[:, :, own], held.answer[:, :, own], held.answer[:, :, -1:]
     back, gradient = np.swapaxes(held.rest[:, :, own], 1, 2), given.gradient[:, :, None]
-    penalty = pulls[:, None, None, None] * np.eye(inside.shape[1])
-    last = np.linalg.solve(_of_others(inside) - back @ answer + penalty, _of_others(gradient[:, own]) - back @ alone)
+    left = _of_others(inside) - back @ answer
+    right = _of_others(gradient[:, own]) - back @ alone
+    last = np.concatenate([np.linalg.solve(left + pull * np.eye(left.shape[1]), right) for pull in pulls], axis=2)
     first = alone - answer @ last
-    bent = held.own[:, :, held.columns] @ first + 2.0 * (across @ last) - 2.0 * gradient[:, held.columns]
+    bent = held.inside @ first + 2.0 * (across @ last) - 2.0 * gradient[:, held.columns]
     more = inside @ last - 2.0 * gradient[:, own]
-    return np.asarray(given.size + (first * bent).sum(axis=(2, 3)) + (last * more).sum(axis=(2, 3)))
+    return np.asarray(given.size + (first * bent).sum(axis=1).T + (last * more).sum(axis=1).T)

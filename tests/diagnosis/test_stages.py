@@ -174,6 +174,7 @@ def assert_same_to_the_bit(one, other):
         assert repr(one) == repr(other)
 
 
+@pytest.mark.slow
 def test_of_a_camera_killed_after_each_stage_the_answer_is_the_same_to_the_bit(tmp_path, monkeypatch):
     log = read_log(still_frames(tmp_path / "log"))
     # Fits then have a scatter of their own.

@@ -179,6 +179,8 @@ def _signed_ranks(after: Floats, before: Floats, blocks: Whole) -> tuple[float, 
     logs = -np.diff(np.log(sums[:, (sums > 0.0).all(axis=0)]), axis=0)[0]
     if len(logs) < 2 or not logs.any():
         return 1.0, 1.0
+    # Blocks that are alike have no rank; SciPy would go through all their signs one by one.
+    logs = logs[logs != 0.0]
     return float(wilcoxon(logs, alternative="less").pvalue), float(wilcoxon(logs, alternative="greater").pvalue)
 
 

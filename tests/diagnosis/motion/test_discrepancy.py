@@ -106,6 +106,7 @@ def test_nothing_is_used_where_nothing_is_missing(seed):
     assert not fit_discrepancy(planted_drives(TRUTH, episodes=6, seconds=12.0, seed=seed), TRUTH).used
 
 
+@pytest.mark.slow
 def test_slow_wheels_are_learnt_alone_and_else_what_matters_in_few_drives_is_looked_for():
     drives = planted_drives({**TRUTH, "wheel_gain.left": 0.9, "wheel_gain.right": 0.9}, episodes=6, seconds=12.0)
     learnt = fit_discrepancy(drives, TRUTH)
@@ -118,6 +119,7 @@ def test_slow_wheels_are_learnt_alone_and_else_what_matters_in_few_drives_is_loo
     assert not fit_discrepancy(replace(drives, rules=replace(RULES, rare_group_share=0.9)), TRUTH).used
 
 
+@pytest.mark.slow
 def test_a_delay_that_stood_for_slow_commands_gives_way_to_them():
     slow = learnt_theta(
         Learnt(FittedRange((-1.0, 1.0), (-6.0, 6.0)), (LearntCurve("ramped", "duty", (RAMP,), (1.0,)),))
@@ -203,6 +205,7 @@ def test_curves_are_named_only_where_they_do_what_an_effect_does():
     assert match_named_effect(drives, TRUTH, worse, TAKEN) is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("tracked", "share"),
     [

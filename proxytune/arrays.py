@@ -1,7 +1,11 @@
-"""Types of arrays, by what they hold, and how they are gone through: by NumPy's buffers, or by compiled loops."""
+"""Types of arrays, by what they hold, and how they are gone through: by NumPy's buffers, by compiled loops, threads."""
 
+import functools
+import sys
+from contextlib import AbstractContextManager
 from importlib import import_module
 from types import ModuleType
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +24,23 @@ def compiled_loops(module: str) -> ModuleType | None:
         return import_module(module)
     except Exception:
         return None
+
+
+def one_thread() -> AbstractContextManager[Any]:
+    """Have libraries use one thread meanwhile."""
+    limited: AbstractContextManager[Any] = _libraries(len(sys.modules)).limit(limits=1)
+    return limited
+
+
+@functools.lru_cache(maxsize=1)
+def _libraries(modules: int) -> Any:
+    """The libraries that have threads of their own, while so many modules are loaded: another may bring another.
+
+    Looking for them takes longer than a short episode, or than a prediction.
+    """
+    from threadpoolctl import ThreadpoolController
+
+    return ThreadpoolController()
 
 
 class SmallBuffers:

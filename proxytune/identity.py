@@ -76,11 +76,17 @@ def meaning_of_code(thing: Any) -> str:
         thing, kept = thing.func, (*kept, repr(thing.args), repr(sorted(thing.keywords.items())))
     if isinstance(thing, str):
         return digest(thing, *kept)
-    code = thing if inspect.isroutine(thing) or inspect.isclass(thing) else type(thing)
+    code: Any = thing if inspect.isroutine(thing) or inspect.isclass(thing) else type(thing)
     try:
-        return digest(_meaning(".py", textwrap.dedent(inspect.getsource(code)).encode()), *kept)
+        return digest(_meaning(".py", _source_of(code)), *kept)
     except (OSError, TypeError):
         return digest(_compiled(getattr(code, "__code__", code.__qualname__)), *kept)
+
+
+@functools.lru_cache(maxsize=256)
+def _source_of(code: Any) -> bytes:
+    """Kept, since Python reads a whole module for each of its classes."""
+    return textwrap.dedent(inspect.getsource(code)).encode()
 
 
 def _compiled(code: Any) -> object:

@@ -9,6 +9,7 @@ import sys
 from collections.abc import Callable, Iterator
 from importlib import import_module
 from importlib.util import find_spec
+from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
@@ -50,10 +51,11 @@ def pytest_collection_finish() -> None:
 @pytest.fixture(autouse=True)
 def _forget_folders() -> Iterator[None]:
     """Forget where a test's modules lay: a search for plug-ins looks at every folder that is still known."""
-    path, known = list(sys.path), set(sys.modules)
+    path, last = list(sys.path), next(reversed(sys.modules))
     yield
     sys.path[:] = path
-    for name in sys.modules.keys() - known:
+    # Modules stand in the order in which they were imported.
+    for name in list(takewhile(lambda name: name != last, reversed(sys.modules))):
         if name.startswith("beside_"):
             del sys.modules[name]
 

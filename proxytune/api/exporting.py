@@ -162,7 +162,7 @@ def _instance_of(path: Path) -> tuple[report.Instance, tuple[str, ...]]:
         return report.Instance(robot, theta, dict(region.intervals), f"the best θ of the study {settings.name}"), ()
     model = driving.read_model_of(path, Path.cwd())
     catalogue = driving.catalogue_of(model.robot, Path.cwd())
-    if model.robot in driving.robot_names(catalogue.folder):
+    if driving.is_robot(model.robot, catalogue.folder):
         robot = driving.read_robot(model.robot, catalogue.folder)
     elif model.geometry:
         robot = driving.robot_from_geometry(model.robot, model.geometry, NO_RATE_HZ)

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from proxytune import diagnosis
-from proxytune.driving import Robot, catalogue_of, read_model_of, read_robot, robot_from_geometry, robot_names
+from proxytune.driving import Robot, catalogue_of, is_robot, read_model_of, read_robot, robot_from_geometry
 from proxytune.effects import Catalogue, Model
 from proxytune.errors import InputError, LogError
 from proxytune.importing import Facts, Source, Wanted, as_log, open_log, read_source, with_named_pictures, write_log
@@ -97,7 +97,7 @@ def import_log(
 
 def _known_robot(name: str) -> Robot | None:
     with suppress(InputError):
-        return read_robot(name, Path.cwd()) if name in robot_names(Path.cwd()) else None
+        return read_robot(name, Path.cwd()) if is_robot(name, Path.cwd()) else None
     return None
 
 
@@ -318,7 +318,7 @@ def predict(
 
 
 def _robot_of(model: Model, log: Log, catalogue: Catalogue) -> Robot:
-    if model.robot in robot_names(catalogue.folder):
+    if is_robot(model.robot, catalogue.folder):
         return diagnosis.robot_of(log, model.robot, catalogue)
     robot = robot_from_geometry(model.robot, model.geometry or log.geometry, log.rate_hz)
     return replace(robot, catalogue=catalogue)

@@ -8,7 +8,7 @@ from pathlib import Path
 from rich.text import Text
 
 from proxytune.cli.terminal import Answer
-from proxytune.driving import read_robot, robot_names
+from proxytune.driving import is_robot, read_robot
 from proxytune.errors import InputError, RunError
 from proxytune.files import folder_draft_of
 from proxytune.skeletons import Skeleton, family_skeleton, robot_from_urdf, robot_skeleton, study_skeleton
@@ -64,7 +64,7 @@ def _check(arguments: argparse.Namespace) -> None:
     spec = find_spec(name) if kind == "family" else None
     if spec is not None and spec.origin:  # A mere folder of this name has none
         raise InputError(f"'{name}': a Python module of this name is installed; choose another name")
-    if kind == "robot" and name in robot_names():
+    if kind == "robot" and is_robot(name):
         raise InputError(f"'{name}': a robot of this name comes with proxytune; choose another name")
     for option, of in (("figures", "robot"), ("urdf", "robot"), ("drive", "robot"), ("robot", "study")):
         if getattr(arguments, option) is not None and kind != of:

@@ -57,6 +57,7 @@ from .robot import (
     UNITS as UNITS,
     Robot as Robot,
     catalogue_of as catalogue_of,
+    is_robot as is_robot,
     read_model_of as read_model_of,
     read_robot as read_robot,
     robot_from_geometry as robot_from_geometry,

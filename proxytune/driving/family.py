@@ -40,7 +40,7 @@ from proxytune.driving.optics import CameraFigures
 from proxytune.driving.plants import Plant, check_body, drivetrain
 from proxytune.driving.road import Arc, Road
 from proxytune.driving.road_picture import draw_floor
-from proxytune.driving.robot import Robot, catalogue_of, read_model_of, read_robot, robot_home, robot_names
+from proxytune.driving.robot import Robot, catalogue_of, is_robot, read_model_of, read_robot, robot_home, robot_names
 from proxytune.effects import Chain, Effect, FilterContext, Signal, Stage, effects_from, read_effects, stage_chain
 from proxytune.errors import EpisodeError, InputError
 from proxytune.identity import digest, meaning_of, modules_beside, versions_of
@@ -326,9 +326,11 @@ def lane_following(section: Section, *, model: Path | None) -> LaneFollowing:
     section.only(("robot", "plant", "camera", "map", "seconds", "position_noise_m", "heading_noise_deg", "effects"))
     folder = section.path.resolve().parent
     given = read_model_of(model, folder) if model else None
-    robot = _agreed(section, "robot", given.robot if given else None, "duckiebot", robot_names(folder))
+    robot = _agreed(section, "robot", given.robot if given else None, "duckiebot")
+    if not is_robot(robot, folder):
+        raise section.error("robot", f"unknown value '{robot}'; {nearest(robot, robot_names(folder))}")
     catalogue = catalogue_of(robot, folder)
-    plant = _agreed(section, "plant", given.plant if given else None, "bullet", PLANTS)
+    plant = section.text("plant", _agreed(section, "plant", given.plant if given else None, "bullet"), choices=PLANTS)
     camera = section.text("camera", "ground_plane", choices=CAMERAS)
     _check_equipment(section, read_robot(robot, folder), plant, camera)
     figures = read_robot(robot, folder).figures
@@ -376,10 +378,8 @@ def _check_bends(section: Section, robot: Robot, road: Road) -> None:
         raise section.error("map", f'{tight}; take map = "car_loop" or a map of your own')
 
 
-def _agreed(section: Section, key: str, of_model: str | None, default: str, known: tuple[str, ...]) -> str:
+def _agreed(section: Section, key: str, of_model: str | None, default: str) -> str:
     value = section.text(key, of_model or default)
     if of_model is not None and value != of_model:
         raise section.error(key, f"is '{value}' but the model says '{of_model}'; take one of them out")
-    if value not in known:
-        raise section.error(key, f"unknown value '{value}'; {nearest(value, known)}")
     return value

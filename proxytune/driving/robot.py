@@ -2,6 +2,7 @@
 
 import functools
 import math
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -145,6 +146,17 @@ def robot_names(folder: Path | None = None) -> tuple[str, ...]:
     return tuple(sorted(names | set(plugins("robot"))))
 
 
+def is_robot(name: str, folder: Path | None = None) -> bool:
+    """True if one of `robot_names` is called so."""
+    return _folder_of(name, folder) is not None or name in plugins("robot")
+
+
+def _folder_of(name: str, folder: Path | None) -> Path | None:
+    one_folder = name.strip(".") and name == Path(name).name
+    places = (home / name for home in _homes(folder) if one_folder)
+    return next((place for place in places if os.path.isfile(place / "robot.toml")), None)
+
+
 def robot_home(name: str, folder: Path | None = None) -> Path:
     """The folder of a robot: in the study's folder first, then beside it, then shipped, then what a plug-in names.
 
@@ -152,12 +164,11 @@ def robot_home(name: str, folder: Path | None = None) -> Path:
         SettingsError: If there is no such robot.
         ExtensionError: If its plug-in cannot be used.
     """
-    if name not in robot_names(folder):
+    if own := _folder_of(name, folder):
+        return own
+    if name not in plugins("robot"):
         hint = nearest(name, robot_names(folder))
         raise SettingsError(f"robot '{name}' is unknown (your own is a folder {name} with robot.toml); {hint}")
-    for home in _homes(folder):
-        if (home / name / "robot.toml").is_file():
-            return home / name
     found = load(name, kind="robot")
     if not isinstance(found, str | Path):
         raise ExtensionError(f"robot '{name}': its plug-in must be the path of its folder, got {type(found).__name__}")
@@ -190,7 +201,7 @@ def catalogue_of(robot: str, folder: Path | None, own: tuple[str, ...] = ()) -> 
 
     A user's folder comes before what is shipped; `own` are effects that a diagnosis is to try beside.
     """
-    known = robot in robot_names(folder)
+    known = is_robot(robot, folder)
     return replace(read_robot(robot, folder).catalogue if known else Catalogue(folder), folder=folder, own=own)
 
 

@@ -56,10 +56,15 @@ def plugins(kind: str, shipped: Collection[str] = ()) -> Mapping[str, EntryPoint
 def _path() -> tuple[str, ...]:
     """Where packages are installed: sys.path without the current folder and those of studies, which hold anything."""
     try:
-        users = {*map(os.path.realpath, folders()), os.getcwd()}
+        return _without(tuple(sys.path), tuple(folders()), os.getcwd())
     except FileNotFoundError:  # It has been deleted
         return tuple(filter(None, sys.path))
-    return tuple(place for place in sys.path if os.path.realpath(place) not in users)
+
+
+@lru_cache(maxsize=1)
+def _without(path: tuple[str, ...], users: tuple[str, ...], here: str) -> tuple[str, ...]:
+    left_out = {*map(os.path.realpath, users), here}
+    return tuple(place for place in path if os.path.realpath(place) not in left_out)
 
 
 @lru_cache(maxsize=1)

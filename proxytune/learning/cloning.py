@@ -11,9 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from sklearn.exceptions import ConvergenceWarning
 from sklearn.neural_network import MLPRegressor
-from threadpoolctl import threadpool_limits
 
-from proxytune.arrays import Floats
+from proxytune.arrays import Floats, one_thread
 from proxytune.domain import Demonstration
 from proxytune.errors import LearnerError
 from proxytune.learning.learner import Weights
@@ -90,7 +89,7 @@ class BehaviourCloning:
         scale = start or _scale(samples.commands)
         wanted = (samples.commands - scale["centre"]) / scale["spread"]
         network = self._network(len(wanted), seed)
-        with threadpool_limits(limits=1), warnings.catch_warnings():
+        with one_thread(), warnings.catch_warnings():
             # The number of steps is fixed: that the loss might still fall is known.
             warnings.simplefilter("ignore", ConvergenceWarning)
             if start is not None:

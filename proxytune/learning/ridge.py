@@ -7,9 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 from sklearn.kernel_approximation import RBFSampler
 from sklearn.linear_model import Ridge
-from threadpoolctl import threadpool_limits
 
-from proxytune.arrays import Floats
+from proxytune.arrays import Floats, one_thread
 from proxytune.domain import Demonstration
 from proxytune.errors import LearnerError
 from proxytune.learning.cloning import grey_cells
@@ -56,7 +55,7 @@ class RandomFeatures:
                 f"{(seen.shape[1], samples.commands.shape[1])}; train the start with as many features and commands"
             )
         left = samples.commands - before["centre"] - seen @ before["slopes"]
-        with threadpool_limits(limits=1):
+        with one_thread():
             fitted = Ridge(alpha=self.penalty, fit_intercept=False, solver="cholesky").fit(seen, left)
         return {**before, "slopes": before["slopes"] + fitted.coef_.T}
 

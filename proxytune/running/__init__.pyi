@@ -5,7 +5,6 @@ from .fleets import (
     Fleet as Fleet,
     can_run_together as can_run_together,
     check_machine as check_machine,
-    one_thread as one_thread,
     run_episode as run_episode,
     run_fleet as run_fleet,
     run_together as run_together,

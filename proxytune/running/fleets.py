@@ -5,18 +5,16 @@ raises as a whole, its episodes are run one by one, which tells whose doing that
 """
 
 import errno
-import functools
 import math
 import pickle
 import random
-import sys
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
-from threadpoolctl import ThreadpoolController
 
+from proxytune.arrays import one_thread
 from proxytune.domain import DomainFamily, Episode, Outcome
 from proxytune.errors import EpisodeError, RunError
 from proxytune.extensions import describe, is_users, one_line, place_of
@@ -141,21 +139,6 @@ def _seeded(seed: int) -> Iterator[Callable[[], bool]]:
 
 def _generators() -> bytes:
     return pickle.dumps((random.getstate(), np.random.get_state()))
-
-
-def one_thread() -> AbstractContextManager[Any]:
-    """Have libraries use one thread meanwhile."""
-    limited: AbstractContextManager[Any] = _libraries(len(sys.modules)).limit(limits=1)
-    return limited
-
-
-@functools.lru_cache(maxsize=1)
-def _libraries(modules: int) -> ThreadpoolController:
-    """The libraries that have threads of their own, while so many modules are loaded: another may bring another.
-
-    Looking for them takes longer than a short episode.
-    """
-    return ThreadpoolController()
 
 
 def _checked(family: DomainFamily, episode: Episode, result: Any, needed: Collection[str]) -> dict[str, float]:

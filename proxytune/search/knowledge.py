@@ -11,9 +11,8 @@ from functools import cached_property
 from typing import Literal
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
-from proxytune.arrays import Floats
+from proxytune.arrays import Floats, one_thread
 from proxytune.search.engine import from_unit, to_unit, unit_points
 from proxytune.search.likelihood import Likelihood, OutputModel, fit_outputs
 from proxytune.search.loop import Goal, Trial, Values
@@ -338,7 +337,7 @@ def importances(surrogate: Surrogate) -> tuple[Importance, ...]:
     share the surrogate's length scales, so the interval leaves out that these are not known exactly either.
     """
     names = surrogate.space.names
-    with threadpool_limits(limits=1):
+    with one_thread():
         share, alone = _indices(surrogate.mean(_points(len(names), POINTS)).reshape(2 + len(names), -1))
         drawn = _draws(surrogate, _points(len(names), DRAWN_POINTS)).reshape(DRAWS, 2 + len(names), -1)
     low, high = np.quantile(_indices(drawn)[0], LEVELS, axis=0)

@@ -24,14 +24,13 @@ Biometrika 87(1), 2000, with a scale of 1). Trials left out then say how far tha
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache, cached_property, lru_cache
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from threadpoolctl import ThreadpoolController, threadpool_limits
 
-from proxytune.arrays import Floats
+from proxytune.arrays import Floats, one_thread
 from proxytune.errors import RunError
 from proxytune.search.loop import Goal, Trial
 from proxytune.search.surrogate import most_probable, prior_kernel, unit_array
@@ -118,7 +117,7 @@ class OutputModel:
         """Mean and variance (n, outputs) of every output's smooth course at points of the cube; NaN if not modelled."""
         mean, variance = (np.full((len(points), self.outputs), np.nan) for _ in range(2))
         smooth = self.kernel.k1
-        with _libraries().limit(limits=1):
+        with one_thread():
             for group in self.groups:
                 near = smooth(points, group.visited)
                 left = smooth.diag(points) - np.einsum("ij,jk,ik->i", near, group.inverse, near, optimize=True)
@@ -129,7 +128,7 @@ class OutputModel:
     def course(self, points: Floats) -> Floats:
         """The mean of every output (n, outputs) at points of the cube; 0 if it is not modelled."""
         mean = np.zeros((len(points), self.outputs))
-        with _libraries().limit(limits=1):
+        with one_thread():
             for group in self.groups:
                 mean[:, group.columns] = group.mean(self.kernel.k1(points, group.visited))
         return mean
@@ -179,16 +178,10 @@ def _fitted(space: Space, known: Sequence[Known], kernel: "Kernel | None", base:
     with np.errstate(invalid="ignore"):
         constant = np.where(seen, outputs, 0.0).sum(axis=0) / seen.sum(axis=0)
     outputs = outputs - base.course(visited) if base else outputs
-    with threadpool_limits(limits=1):
+    with one_thread():
         kernel = kernel or _fitted_kernel(visited, outputs)
         groups = _groups(kernel, visited, outputs, placement)
     return OutputModel(space, kernel, groups, constant, visited, base)
-
-
-@cache
-def _libraries() -> ThreadpoolController:
-    """Found once: looking for them takes as long as a prediction."""
-    return ThreadpoolController()
 
 
 def _fitted_kernel(visited: Floats, outputs: Floats) -> "Kernel":

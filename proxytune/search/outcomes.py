@@ -10,9 +10,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
-from proxytune.arrays import Floats
+from proxytune.arrays import Floats, one_thread
 from proxytune.search.engine import Engine, Look, from_unit
 from proxytune.search.likelihood import Likelihood, OutputModel, fit_outputs
 from proxytune.search.loop import Goal, Trial, Values
@@ -44,7 +43,7 @@ class Composite:
 
 def most_improving(space: Space, trials: Sequence[Trial], goal: Goal, seed: int) -> Values:
     """The θ whose composed score is expected to improve most on the best visited one."""
-    with threadpool_limits(limits=1):
+    with one_thread():
         model = _with_pending(fit_outputs(space, trials), trials)
         return from_unit(space, _most_improving(model, trials, goal, seed)[0])
 
@@ -66,7 +65,7 @@ def expected_gain(space: Space, trials: Sequence[Trial], goal: Goal, seed: int) 
     Raises:
         RunError: If no trial has an outcome.
     """
-    with threadpool_limits(limits=1):
+    with one_thread():
         model = fit_outputs(space, trials)
         _, gain = _most_improving(model, trials, goal, proposal_seed(seed, len(trials)))
         best = model.visited[int(np.argmin(composed_scores(model, goal, seed)(model.visited).mean(axis=0)))]
@@ -128,7 +127,7 @@ class Outcomes:
     def propose(self, space: Space, trials: Sequence[Trial], seed: int) -> Values:
         """The next point, a function of the trials and the seed alone."""
         drawn = proposal_seed(seed, len(trials))
-        with threadpool_limits(limits=1):
+        with one_thread():
             if len(trials) % 2:
                 return most_improving(space, trials, self.goal, drawn)
             likelihood = Likelihood(fit_outputs(space, trials), self.goal)

@@ -13,9 +13,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.optimize import Bounds, minimize
-from threadpoolctl import threadpool_limits
 
-from proxytune.arrays import Floats
+from proxytune.arrays import Floats, one_thread
 from proxytune.errors import RunError
 from proxytune.search.engine import Engine, Look, from_unit, to_unit, unit_points
 from proxytune.search.loop import Trial, Values, with_failures_as_worst
@@ -67,20 +66,20 @@ class Surrogate:
 
     def predict(self, unit: Floats) -> tuple[Floats, Floats]:
         """Posterior mean and standard deviation, noise excluded, at points (n, parameters) of the unit cube."""
-        with threadpool_limits(limits=1), warnings.catch_warnings():
+        with one_thread(), warnings.catch_warnings():
             warnings.filterwarnings("ignore", message="Predicted variances smaller than 0")
             mean, deviation = self.model.predict(unit, return_std=True)
         return mean, deviation
 
     def mean(self, unit: Floats) -> Floats:
         """Posterior mean (n,) at points (n, parameters) of the unit cube."""
-        with threadpool_limits(limits=1):
+        with one_thread():
             mean: Floats = self.model.predict(unit)
         return mean
 
     def joint(self, unit: Floats) -> tuple[Floats, Floats]:
         """Posterior mean (n,) and covariance (n, n), noise excluded, at points (n, parameters) of the unit cube."""
-        with threadpool_limits(limits=1):
+        with one_thread():
             mean, covariance = self.model.predict(unit, return_cov=True)
         return mean, covariance
 
@@ -111,7 +110,7 @@ def fit_surrogate(space: Space, trials: Sequence[Trial]) -> Surrogate:
     scores = np.array([trial.score for trial in visited], dtype=float)
     kernel = prior_kernel(len(space.intervals))
     model = GaussianProcessRegressor(kernel=kernel, optimizer=most_probable, normalize_y=True, noise="gaussian")
-    with threadpool_limits(limits=1), warnings.catch_warnings():
+    with one_thread(), warnings.catch_warnings():
         # A hyperparameter at its bound is an answer, not a failure.
         warnings.simplefilter("ignore", ConvergenceWarning)
         return Surrogate(space, model.fit(unit, scores), visited)
@@ -164,7 +163,7 @@ class GaussianProcess:
 
     def propose(self, space: Space, trials: Sequence[Trial], seed: int) -> Values:
         """The next point, a function of the set of trials and the seed alone; never a point visited or pending."""
-        with threadpool_limits(limits=1):
+        with one_thread():
             surrogate = _fit_with_pending(space, trials)
             return from_unit(space, _most_promising(surrogate, proposal_seed(seed, len(trials)))[0])
 
@@ -176,7 +175,7 @@ def expected_improvement(space: Space, trials: Sequence[Trial], seed: int) -> tu
         RunError: If no trial has a score.
     """
     surrogate = fit_surrogate(space, with_failures_as_worst(trials))
-    with threadpool_limits(limits=1):
+    with one_thread():
         _, gain = _most_promising(surrogate, proposal_seed(seed, len(trials)))
     return gain, surrogate.noise_deviation
 

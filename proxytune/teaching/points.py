@@ -16,10 +16,11 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from proxytune import learning
+from proxytune.arrays import one_thread
 from proxytune.domain import Classroom, Demonstration, Episode, OnPolicyClassroom, Policy, make_episode
 from proxytune.errors import EpisodeError, LearnerError, ProxytuneError
 from proxytune.extensions import describe, is_users, place_of
-from proxytune.running import check_machine, limited, one_thread, was_ended_in
+from proxytune.running import check_machine, limited, was_ended_in
 from proxytune.seeds import exam_seed, proxy_lessons_seed, round_seed, target_lessons_seed
 from proxytune.space import Interval, Space, Theta
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from proxytune.diagnosis.answer import RULES, Rules
-from proxytune.driving import Robot, read_robot, robot_from_geometry, robot_names
+from proxytune.driving import Robot, is_robot, read_robot, robot_from_geometry, robot_names
 from proxytune.effects import SHIPPED, Catalogue, track_of
 from proxytune.errors import LogError
 from proxytune.logs import Log, LogEpisode, check_kind, rows_of_poses, without_outliers
@@ -449,13 +449,12 @@ def robot_of(log: Log, name: str | None = None, catalogue: Catalogue = SHIPPED) 
         LogError: If the robot is unknown and the log does not state its geometry.
         SettingsError: If the named robot is unknown.
     """
-    names = robot_names(catalogue.folder)
-    if log.robot in names or name not in (None, log.robot):
+    if is_robot(log.robot, catalogue.folder) or name not in (None, log.robot):
         robot = read_robot(name or log.robot, catalogue.folder)
         return replace(robot, catalogue=replace(catalogue, drive=robot.drive))
     missing = [key for figure, key in NEEDED.items() if figure not in log.geometry]
     if missing:
-        unknown = f"{log.name}: robot '{log.robot}' is unknown ({nearest(log.robot, names)})"
+        unknown = f"{log.name}: robot '{log.robot}' is unknown ({nearest(log.robot, robot_names(catalogue.folder))})"
         lacks = f"log.toml does not state {' and '.join(missing)}"
         raise LogError(f"{unknown} and {lacks}; state them, or name a robot with --robot")
     geometry = {**log.geometry}

@@ -25,7 +25,7 @@ from proxytune.diagnosis import (
     RobotClusters,
     main_error,
 )
-from proxytune.driving import robot_names
+from proxytune.driving import is_robot
 from proxytune.effects import Catalogue, Model, is_learnt, model_text
 from proxytune.report.diagnosis.notes import decisive, may_matter, per_cent
 from proxytune.settings import GEOMETRY
@@ -62,7 +62,7 @@ def extended_model_text(found: LogDiagnosis) -> str:
         for name, one in estimates.items()
         if values.get(name) == float(one.value)
     }
-    in_robots = robot.name in robot_names(robot.catalogue.folder)
+    in_robots = is_robot(robot.name, robot.catalogue.folder)
     geometry = {} if in_robots else {figure: robot.figures[figure] for figure in GEOMETRY.values()}
     comments = []
     for part in parts:

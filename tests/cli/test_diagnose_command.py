@@ -3,7 +3,9 @@
 import json
 import re
 import shutil
+from contextlib import redirect_stdout
 from dataclasses import replace
+from io import StringIO
 from pathlib import Path
 
 import hidden_cases as hidden
@@ -39,13 +41,10 @@ def home(tmp_path_factory):
 @pytest.fixture(scope="module")
 def printed(home, few_effects):
     """What was printed, diagnosing a small log once."""
-    with pytest.MonkeyPatch.context() as patch:
-        lines = []
-        patch.setattr("builtins.print", lambda *words, **_: lines.append(" ".join(map(str, words))))
-        folder = write_log(small_log(), home / "log")
+    folder = write_log(small_log(), home / "log")
+    with redirect_stdout(StringIO()) as text:
         assert main(["diagnose", str(folder), "--output", str(home / "out"), "--json"]) == 0
-    (text,) = lines
-    return text
+    return text.getvalue()
 
 
 @pytest.fixture(scope="module")

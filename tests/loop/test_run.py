@@ -7,6 +7,8 @@ import re
 import shutil
 import signal
 import time
+from contextlib import redirect_stdout
+from io import StringIO
 from pathlib import Path
 
 import pytest
@@ -52,12 +54,10 @@ def closed_once(tmp_path_factory):
 
 
 def close_tiny(folder):
-    lines = []
-    with pytest.MonkeyPatch.context() as patch:
+    with pytest.MonkeyPatch.context() as patch, redirect_stdout(StringIO()) as text:
         give_a_diagnosis(patch)
-        patch.setattr("builtins.print", lambda *words, **_: lines.append(" ".join(map(str, words))))
         assert main(["loop", str(folder), "--json"]) == 0
-    return folder, json.loads(lines[-1])
+    return folder, json.loads(text.getvalue())
 
 
 @pytest.fixture

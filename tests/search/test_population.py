@@ -13,6 +13,13 @@ MEASURED = 0.05
 """Standard deviation of what is measured of each robot, in widths of the box."""
 
 
+@pytest.fixture(autouse=True, scope="module")
+def _fewer_draws():
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(population, "DRAWS", 1000)
+        yield
+
+
 def posterior(middle, deviation=MEASURED):
     """What is known of a robot that is measured so: a normal distribution in the box."""
     low, high = np.clip(middle - 5.0 * deviation, 0.0, 1.0), np.clip(middle + 5.0 * deviation, 0.0, 1.0)
@@ -63,9 +70,8 @@ def test_robots_know_themselves_better_by_the_fleet_and_the_next_is_where_they_a
 
 
 @pytest.mark.slow
-def test_few_robots_have_intervals_that_hold_the_truth(monkeypatch):
+def test_few_robots_have_intervals_that_hold_the_truth():
     """Of 30 fleets of five robots, the intervals of spread and of mean hold the truth in nine of ten or more."""
-    monkeypatch.setattr(population, "DRAWS", 1000)
     held = np.zeros(2)
     for seed in range(30):
         _, _, found = fleet(5, (0.08,), seed)

@@ -51,6 +51,7 @@ def document(compared, tmp_path):
     return compared[1]
 
 
+@pytest.mark.slow
 def test_it_prints_one_document_with_every_engine_and_draws_the_figure(document, tmp_path):
     assert [row["engine"] for row in document["engines"]] == ["random", "sobol"]
     assert (document["objective"], document["budget"], document["default"]) == ("analytic", 7, "random")
@@ -65,6 +66,7 @@ def test_it_prints_one_document_with_every_engine_and_draws_the_figure(document,
     assert json.loads((tmp_path / "out" / "compare.json").read_text())["engines"] == document["engines"]
 
 
+@pytest.mark.slow
 def test_finished_runs_are_kept_and_a_line_cut_off_is_run_again(document, tmp_path, capsys):
     path = tmp_path / "out" / "runs.jsonl"
     lines = path.read_text().splitlines()
@@ -77,6 +79,7 @@ def test_finished_runs_are_kept_and_a_line_cut_off_is_run_again(document, tmp_pa
     assert max(row["error"]["high"] for row in again["engines"]) > 100, "the first line was not run again"
 
 
+@pytest.mark.slow
 def test_runs_that_other_code_has_judged_are_judged_again_and_not_run_again(document, tmp_path, capsys, monkeypatch):
     path = tmp_path / "out" / "runs.jsonl"
     fresh = read_runs(path)
@@ -87,6 +90,7 @@ def test_runs_that_other_code_has_judged_are_judged_again_and_not_run_again(docu
     assert json.loads(capsys.readouterr().out)["engines"] == document["engines"]
 
 
+@pytest.mark.slow
 def test_some_of_the_seeds_are_summed_up_and_those_there_are_not_run_again(document, tmp_path, capsys, monkeypatch):
     monkeypatch.setattr(runs, "run_engine", lambda objective, key, engine: pytest.fail(f"seed {key.seed} is run"))
     assert compare("analytic", *FEW[:2], "--seeds", "1:2:1", *FEW[4:], "--output", tmp_path / "out", "--json") == 0

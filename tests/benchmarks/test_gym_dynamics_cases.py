@@ -25,6 +25,7 @@ def test_the_vehicle_itself_lags_by_a_fifth_of_a_second_ahead_and_a_quarter_in_t
     np.testing.assert_allclose(driven(OWN, (-0.2, 0.2))[:, 2], lagging(1.5, 0.25), atol=0.01)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", gym.PHYSICS[3:], ids=lambda case: case.name)
 def test_every_variant_drives_otherwise(case):
     short = {"episodes": 2, "seconds": 15.0, "noiseless": True}

@@ -101,6 +101,7 @@ def test_a_person_reads_the_lines_to_paste(bank, robots, capsys):
     assert "3 robots hardly tell a spread" in " ".join(told.split())
 
 
+@pytest.mark.slow
 def test_a_robot_that_no_theta_explains_is_left_out_by_name(found, bank, robots, tmp_path):
     """p(θ) is what it is without it; its own intervals are still told."""
     odd = write_target(tmp_path / "odd.csv", {"trim": 0.0, "delay": DELAY}, 990, shift=40.0)
@@ -114,6 +115,7 @@ def test_a_robot_that_no_theta_explains_is_left_out_by_name(found, bank, robots,
     assert "<table" in alone._repr_html_()
 
 
+@pytest.mark.slow
 def test_the_table_of_a_bank_will_do(found, bank, robots, tmp_path):
     """Without study.db it says the same, noise included, to the digits that it has."""
     alone = Path(shutil.copytree(bank, tmp_path / "alone"))
@@ -124,6 +126,7 @@ def test_the_table_of_a_bank_will_do(found, bank, robots, tmp_path):
     assert trim[0] == pytest.approx(trim[1], rel=0.1)
 
 
+@pytest.mark.slow
 def test_a_study_with_a_target_knows_trials_too_and_one_by_learning_value_tells_no_theta(make_study, robots):
     """What it has learnt from a bank counts, whatever its own target is."""
     folder = make_study(budget="12", initial="12", engine=None)
@@ -136,6 +139,7 @@ def test_a_study_with_a_target_knows_trials_too_and_one_by_learning_value_tells_
     assert "give a list of tables" in complaint_of(proxytune.fleet, make_study(), str(robots[0]))
 
 
+@pytest.mark.slow
 def test_what_a_robot_says_depends_on_no_other_and_names_alike_have_their_folders(found, bank, robots, tmp_path):
     """Calibration is shared, so the first of the tables is told as any other."""
     few = proxytune.fleet(bank, [robots[3], robots[0]]).document()["robots"]

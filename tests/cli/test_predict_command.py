@@ -80,6 +80,7 @@ def test_a_log_without_a_pose_to_compare_with_is_still_predicted(model, tmp_path
     assert (told["windows"], told["error"]["poses"]) == (0, 0), "no window has a pose near its end"
 
 
+@pytest.mark.slow
 def test_a_log_whose_clock_jumps_is_judged_on_one_clock_as_a_diagnosis_does(model, tmp_path, answered, capsys):
     case, late = hidden.CLEAN[2], np.zeros((6, 800))
     late[3, 500:] = 0.5

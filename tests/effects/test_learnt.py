@@ -59,7 +59,9 @@ def effect_of(*groups, size=0.3, seed=3):
 
 
 ALL = effect_of(*MOTION_GROUPS)
-EFFECTS = [pytest.param(effect_of(group), id=group) for group in MOTION_GROUPS] + [pytest.param(ALL, id="all")]
+EFFECTS = [pytest.param(effect_of(group), id=group) for group in MOTION_GROUPS] + [
+    pytest.param(ALL, id="all", marks=pytest.mark.slow)
+]
 
 
 def a_signal(seed, length=90):

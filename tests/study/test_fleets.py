@@ -59,6 +59,7 @@ def undisturbed(make_studies):
     return functools.cache(run)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("most", "jobs"), [(5, 1), *(pytest.param(*one, marks=pytest.mark.slow) for one in ((1, 2), (48, 3)))]
 )

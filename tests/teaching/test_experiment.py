@@ -64,6 +64,7 @@ def figures(found):
     return {lesson.name: lesson.curve.scores.tolist() for lesson in found.teachers}
 
 
+@pytest.mark.slow
 def test_the_right_proxy_saves_target_samples_and_the_wrong_one_harms(make_study):
     found = run(make_taught(make_study))
     worth = {lesson.name: lesson.worth for lesson in found.teachers}

@@ -30,7 +30,9 @@ def scrubbing_log():
 
 @pytest.fixture(scope="module")
 def diagnosis():
-    return diagnose(scrubbing_log(), ROBOT, ("trim", "delay"))
+    with pytest.MonkeyPatch.context() as patch:
+        look_for_few(patch)
+        return diagnose(scrubbing_log(), ROBOT, ("trim", "delay"))
 
 
 def test_the_planted_effect_is_found_with_its_value_and_its_worth_first_of_all_candidates(diagnosis):

@@ -309,6 +309,9 @@ def test_ratios_are_shown_by_many_blocks_also_where_few_weigh_most_and_not_by_fe
     assert not ratio(squares, squares, blocks).above
     assert not ratio(np.append(squares, 0.0), np.append(squares, 0.0), np.arange(9)).below
     assert not ratio(np.array([4.0, 9.0, 1.0]), np.array([1.0, 1.0, 0.9]), np.arange(3)).above
+    # Where three of fifteen blocks are alike, all of the others go down by chance in one of 2 ** 12 cases.
+    after = np.where(np.arange(15) < 3, 1.0, np.linspace(0.5, 0.9, 15))
+    assert ratio(after, np.ones(15), np.arange(15)).p_below == pytest.approx(0.5**12)
     blocks = np.repeat(np.arange(16), 20)
     before = np.exp(np.random.default_rng(1).normal(size=320))
     more = np.append(np.full(15, 1.05), 300.0)[blocks]

@@ -1,6 +1,5 @@
 """Sentences of a diagnosis of motion: each effect and its worth, what is left, clocks, what to drive next."""
 
-import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
@@ -8,11 +7,11 @@ import numpy as np
 
 from proxytune.diagnosis import AdoptedEffect, Clocks, Diagnosis, EffectSize, Learning, Offset, Ratio, RobotClusters
 from proxytune.effects import PLACE, is_learnt, learnt_effect
+from proxytune.files import package_table
 from proxytune.report.wording import fixed, listed, percent
-from proxytune.report.writing import fill
 from proxytune.space import Theta
 
-VERDICTS: Mapping[str, Mapping[str, str]] = tomllib.loads(fill("verdicts.toml"))
+VERDICTS: Mapping[str, Mapping[str, str]] = package_table("report/templates/verdicts.toml")
 """What each verdict means, of motion and of the camera, and the next step."""
 AMPLE = 30.0
 """Log-likelihood gain [nats] in a minute above which one minute surely decides."""

@@ -1,7 +1,6 @@
 """For ROS 2: parameters of a controller, a node that bends commands as was found, and one that plays a drive."""
 
 import math
-import tomllib
 from collections.abc import Sequence
 from pprint import pformat
 
@@ -11,6 +10,7 @@ from proxytune.arrays import Floats
 from proxytune.diagnosis import Diagnosis, commands_as
 from proxytune.driving import REQUIRED, CameraFigures, Robot
 from proxytune.effects import effect_of, is_learnt
+from proxytune.files import package_table
 from proxytune.logs import CAR_COMMANDS, COMMANDS
 from proxytune.report.export.instance import BENT, FILTER, Instance, header
 from proxytune.report.writing import fill
@@ -122,7 +122,7 @@ def player_text(diagnosis: Diagnosis) -> str:
     """The node for the next drive of a diagnosis that has one, as a Python file."""
     drive, kind = diagnosis.next_drive, diagnosis.command
     assert drive is not None
-    told = tomllib.loads(fill("player.toml"))["ackermann" if kind in CAR_COMMANDS else "twist"]
+    told = package_table("report/templates/player.toml")["ackermann" if kind in CAR_COMMANDS else "twist"]
     return fill(
         "player.py.txt",
         **told,

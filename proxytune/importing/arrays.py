@@ -45,8 +45,6 @@ def load_arrays(path: Path) -> Arrays:
         arrays = unpacking.read_arrays(path)
     except InputError:
         raise
-    except FileNotFoundError:
-        raise LogError(f"{path}: no such file; check the path") from None
     except Exception as problem:  # A damaged file fails in many ways: zipfile's, zlib's and numpy's own.
         if "pickle" in str(problem):
             raise LogError(f"{path}: holds pickled objects; save plain arrays of numbers with numpy.savez") from None
@@ -83,11 +81,8 @@ def as_table(path: Path, arrays: Arrays, times: str) -> Table:
 
 def _flattened(name: str, array: NDArray[Any], count: int) -> dict[str, NDArray[Any]]:
     """The columns of an array; none where it is of another length or does not hold numbers."""
-    if (
-        array.ndim not in (1, 2)
-        or len(array) != count
-        or array.dtype.kind not in ("iufU" if array.ndim == 1 else "iuf")
-    ):
+    kinds = "iufU" if array.ndim == 1 else "iuf"
+    if array.ndim not in (1, 2) or len(array) != count or array.dtype.kind not in kinds:
         return {}
     if array.ndim == 1:
         return {name: array}

@@ -78,21 +78,6 @@ class Bag:
             yield receive_ns, message
 
 
-def is_bag(path: Path) -> bool:
-    """True if a path is a ROS bag, or a folder of several."""
-    return bool(_bags_in(path))
-
-
-def bags_in(path: Path) -> dict[str, Path]:
-    """The bags that a path holds, by the names of their drives."""
-    if not path.exists():
-        raise LogError(f"{path}: no such file; check the path")
-    bags = _bags_in(path)
-    if not bags:
-        raise LogError(f"{path}: holds no bag; give a .bag, .db3 or .mcap file, or a folder of bags")
-    return bags
-
-
 @contextmanager
 def open_bag(path: Path) -> Iterator[Bag]:
     """Open a bag while it is read."""
@@ -142,7 +127,8 @@ def complaints(path: Path, what: str) -> Iterator[None]:
         raise LogError(f"{path}: {what} ({reason}); {remedy}") from None
 
 
-def _bags_in(path: Path) -> dict[str, Path]:
+def bags_in(path: Path) -> dict[str, Path]:
+    """The bags that a path is or holds, by the names of their drives; none where it is of another form."""
     if _is_one(path):
         return {_name_of(path): path}
     bags: dict[str, Path] = {}
@@ -256,11 +242,7 @@ def collect(bag: Bag, topic: str, row_of: Callable[[Any], Row], *, finite: bool 
 
 def read_commands(bag: Bag, topic: str, kind: str, stamps: str) -> tuple[Commands, tuple[str, ...]]:
     """The commands of a topic, and what there is to say of their times."""
-
-    def row_of(message: Any) -> Row:
-        return COMMAND_TYPES[message.__msgtype__.rpartition("/")[2]][1](message)
-
-    both, values = collect(bag, topic, row_of)
+    both, values = collect(bag, topic, lambda said: COMMAND_TYPES[said.__msgtype__.rpartition("/")[2]][1](said))
     times, notes = choose_times(both, stamps, topic)
     return Commands(kind, times, values), notes
 

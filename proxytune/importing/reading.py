@@ -18,7 +18,7 @@ from proxytune.arrays import Floats
 from proxytune.errors import InputError, LogError, RunError
 from proxytune.files import folder_draft_of, temporary_folder
 from proxytune.importing.arrays import is_arrays, read_arrays
-from proxytune.importing.bag import is_bag
+from proxytune.importing.bag import bags_in
 from proxytune.importing.checks import check_units, checked_drive, lag_of
 from proxytune.importing.source import Drive, Facts, Pictures, Source, Survey, Wanted
 from proxytune.importing.tables import is_csv_tables, is_mrclam, is_tum, read_csv_tables, read_mrclam, read_tum
@@ -87,8 +87,8 @@ def rows_notes(drives: Sequence[Drive]) -> list[str]:
     ]
 
 
-FORMS: Mapping[Callable[[Path], bool], Callable[[Path, Wanted], Source]] = {
-    is_bag: read_bag,
+FORMS: Mapping[Callable[[Path], object], Callable[[Path, Wanted], Source]] = {
+    bags_in: read_bag,
     is_arrays: read_arrays,
     is_mrclam: read_mrclam,
     is_tum: read_tum,

@@ -250,8 +250,6 @@ def read_mrclam(path: Path, wanted: Wanted) -> Source:
     folder, robot = (path.parent, match[1]) if match and not path.is_dir() else (path, wanted.poses)
     if folder == path:
         robots = _robots(folder)
-        if not robots:
-            raise LogError(f"{path}: has no file such as Robot1_Groundtruth.dat; give a folder of the MRCLAM data set")
         if robot and robot not in robots:
             raise LogError(f"{path}: has no robot '{robot}'; {nearest(robot, robots)}")
         if not robot and len(robots) > 1:

@@ -3,7 +3,6 @@
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from types import MappingProxyType
 from typing import TypeVar
 
 import numpy as np
@@ -188,18 +187,12 @@ def _check_overlap(samples: Rows, rows: Rows, issued: Mapping[str, Issued], offs
             raise rows.error(row, "time", problem)
 
 
-SIZES: Mapping[str, tuple[str, float, str]] = MappingProxyType(
-    {
-        **dict.fromkeys(COMMANDS["duty"], ("a duty must be", 1.0, "divide by full duty")),
-        "throttle": (
-            "throttle must be",
-            1.0,
-            "divide a percentage by 100, and a pulse's distance from rest by its range",
-        ),
-        "steering": ("steering must be", 1.0, "divide degrees by the greatest wheel angle, pulses by their range"),
-        "steering_angle": ("a wheel angle must be", np.pi / 2.0, "turn degrees into radians"),
-    }
-)
+SIZES: Mapping[str, tuple[str, float, str]] = {
+    **dict.fromkeys(COMMANDS["duty"], ("a duty must be", 1.0, "divide by full duty")),
+    "throttle": ("throttle must be", 1.0, "divide a percentage by 100, and a pulse's distance from rest by its range"),
+    "steering": ("steering must be", 1.0, "divide degrees by the greatest wheel angle, pulses by their range"),
+    "steering_angle": ("a wheel angle must be", np.pi / 2.0, "turn degrees into radians"),
+}
 """How a command is called in a complaint, the largest, and what to do about a larger one."""
 
 

@@ -176,10 +176,7 @@ def residual_map(drives: Drives, both: Mapping[str, Strayed]) -> Figure:
     down = len(both) // across
     figure, grid = style.grid_of(min(tall, TALLEST) * down + 1.2, down, across, sharex=True, sharey=True)
     panels = list(grid.ravel())
-    for axes in grid[:, 0]:
-        axes.set_ylabel("y [m]", fontsize=8)
-    for axes in grid[-1]:
-        axes.set_xlabel("x [m]", fontsize=8)
+    style.label_sides(grid, "x [m]", "y [m]")
     # From the smallest distances of any model to the largest of all, but for a few; at least a factor of ten
     low, high = np.quantile(np.concatenate([one.rms for one in both.values()]), (0.02, 0.98))
     high = max(float(high), TINIEST_MM)

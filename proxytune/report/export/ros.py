@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from pprint import pformat
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from proxytune.arrays import Floats
 from proxytune.diagnosis import Diagnosis, commands_as
@@ -76,13 +77,9 @@ def _camera_info(figures: CameraFigures) -> str:
 
 def _transform(child: str, pose: Floats) -> str:
     """Parameters of tf2_ros' static_transform_publisher; base_link is the middle of the axle, on the floor."""
-    # The quaternion of a rotation by less than half a turn
-    turned = pose[:3, :3]
-    w = math.sqrt(max(1e-12, 1.0 + float(np.trace(turned)))) / 2.0
-    skew = turned - turned.T
-    turn = (*(float(skew[at]) / 4.0 / w for at in ((2, 1), (0, 2), (1, 0))), w)
+    numbers = (*pose[:3, 3].tolist(), *Rotation.from_matrix(pose[:3, :3]).as_quat(canonical=True).tolist())
     names = ("x", "y", "z", "qx", "qy", "qz", "qw")
-    return _filled("ros_transform", child=child, **dict(zip(names, (*pose[:3, 3].tolist(), *turn), strict=True)))
+    return _filled("ros_transform", child=child, **dict(zip(names, numbers, strict=True)))
 
 
 def _filled(template: str, **values: float | str) -> str:

@@ -164,10 +164,7 @@ def _lines(axes: Axes, drives: Drives, strayed: Strayed, colour: str) -> list[tu
 
 
 def residual_map(drives: Drives, both: Mapping[str, Strayed]) -> Figure:
-    """The measured paths in the colours of the distance, or its mean by place where too many paths would overlap.
-
-    All maps share one logarithmic scale. Arrows say in which direction the paths were driven.
-    """
+    """The measured paths in the colours of the distance, or its mean by place where too many paths would overlap."""
     before = next(iter(both.values()))
     extent = np.ptp(drives.poses[before.increment, 1, :2], axis=0)
     # Maps stand above each other, where the floor is long, or side by side.

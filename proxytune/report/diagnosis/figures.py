@@ -19,11 +19,7 @@ from proxytune.report.wording import plain
 
 
 def motion_figures(diagnosis: Diagnosis) -> Mapping[str, Figure]:
-    """Draw everything that a diagnosis has to show, by the name of the figure.
-
-    What has nothing to show is left out: the curve of an effect where none was added and no signal explains anything,
-    the learnt curves where none are used.
-    """
+    """Draw everything that a diagnosis has to show, by the name of the figure; what has nothing to show is left out."""
     both = strayed(diagnosis)
     figures = {
         "residual_over_time": residual_over_time(diagnosis.parts.tested, both),

@@ -16,6 +16,7 @@ from typing import Any, Literal, Protocol
 
 import numpy as np
 
+from proxytune import usefulness
 from proxytune.arrays import Floats
 from proxytune.domain import DomainFamily, Episode
 from proxytune.errors import InputError, SettingsError
@@ -34,18 +35,7 @@ from proxytune.study import (
     result_of,
     stored_run,
 )
-from proxytune.usefulness import (
-    ALL,
-    MEASURES,
-    PODS,
-    Assessment,
-    Measure,
-    Measured,
-    assess,
-    interval as central_interval,
-    pod_of_images,
-    pod_of_poses,
-)
+from proxytune.usefulness import ALL, MEASURES, PODS, Assessment, Measure, Measured, assess
 
 
 def has_answer(study: Study) -> bool:
@@ -130,8 +120,8 @@ class Discrepancy:
         here = self.proxy.replay(episode, commands)
         poses, pictures = (min(map(len, both)) for both in ((here.poses, there.poses), (here.pictures, there.pictures)))
         # The start is the same by construction, so it is no observation.
-        pose = pod_of_poses(proxy=here.poses[1:poses], target=there.poses[1:poses])
-        image = pod_of_images(proxy=here.pictures[:pictures], target=there.pictures[:pictures])
+        pose = usefulness.pod_of_poses(proxy=here.poses[1:poses], target=there.poses[1:poses])
+        image = usefulness.pod_of_images(proxy=here.pictures[:pictures], target=there.pictures[:pictures])
         return {"pod_pose": pose, "pod_image": image}
 
 
@@ -271,7 +261,7 @@ def pod_mean(values: Sequence[float], *, seed: int = 0) -> PodMean:
     if len(found) < 2:
         return PodMean(float(found.mean()), None, len(found))
     draws = np.random.default_rng(seed).integers(len(found), size=(RESAMPLES, len(found)))
-    return PodMean(float(found.mean()), central_interval(found[draws].mean(axis=1)), len(found))
+    return PodMean(float(found.mean()), usefulness.interval(found[draws].mean(axis=1)), len(found))
 
 
 def all_curves(run: StudyRun) -> Sequence[SweepCurve]:

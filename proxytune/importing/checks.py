@@ -165,12 +165,10 @@ def checked_drive(drive: Drive, where: str, offset_s: float = 0.0) -> tuple[Driv
 
 def _check_sizes(parts: tuple[Floats, ...], what: str, about: str) -> None:
     """Refuse numbers that are none of a robot: the square of their square would not be finite."""
-    for part in parts:
-        # NaN stands for what was not measured, and is told of elsewhere
-        large = np.abs(np.where(np.isnan(part), 0.0, part)) > LARGEST
-        if large.any():
-            value = float(part[large].flat[0])
-            raise LogError(f"{about}: its {what} hold the number {value:g}; leave out what was not measured")
+    values = np.concatenate([np.ravel(part) for part in parts])
+    large = values[np.abs(values) > LARGEST]  # NaN is none: what was not measured is told of elsewhere
+    if len(large):
+        raise LogError(f"{about}: its {what} hold the number {large[0]:g}; leave out what was not measured")
 
 
 LARGEST = 1e50

@@ -101,7 +101,7 @@ def _chords(episode: LogEpisode) -> Chords:
 
 def _axes(drives: list[Chords]) -> Iterator[str]:
     """Tell where the robot moves in a mirror: x or y reversed, or exchanged, and headings not."""
-    speed, course, heading = (np.concatenate([getattr(one, name) for one in drives]) for name in CHORD_PARTS)
+    _, course, heading, speed, _ = (np.concatenate(parts) for parts in zip(*drives, strict=True))
     if len(speed) < ENOUGH:
         return
     moves = speed >= max(MOVES * float(np.quantile(speed, 0.9)), 1e-9)
@@ -181,9 +181,6 @@ def _frozen(log: Log, asked: Sequence[tuple[Floats, Floats]]) -> Iterator[str]:
                     "a tracker that lost the robot; cut it there"
                 )
                 return
-
-
-CHORD_PARTS = ("speed", "course", "heading")
 
 
 def _commanded(log: Log, figures: Figures) -> list[tuple[Floats, Floats]]:

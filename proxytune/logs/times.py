@@ -200,9 +200,7 @@ def on_own_grid(times: Floats, poses: Floats, rate_hz: float) -> tuple[Floats, F
     length = int(max(np.rint(steps[-1]), rows.max(initial=0))) + 1
     grid = times[0] + np.arange(length) / rate_hz
     measured = Measured(times[known], poses[known], rows)
-    on_grid = np.full((length, 3), np.nan)
-    on_grid[rows] = moved(measured, grid[rows])
-    return grid, on_grid, measured
+    return grid, spread(moved(measured, grid[rows]), rows, length), measured
 
 
 def _check_density(samples: Rows, usual: float) -> None:

@@ -185,18 +185,12 @@ BINS = 20
 """Values of the signal, equally often driven, over which means are taken."""
 MEASURED, ANY = "measured", "free curve"
 DEGREES = 180.0 / np.pi
+_TABLES = package_table("report/templates/panels.toml")
 CUE_PANELS: Mapping[str, tuple[Panel, ...]] = {
-    group: tuple(Panel(*panel) for panel in panels)
-    for group, panels in package_table("report/templates/panels.toml").items()
+    group: tuple(Panel(*panel) for panel in panels) for group, panels in _TABLES["panels"].items()
 }
 """Panels drawn for a signal group."""
-NAMES = {
-    "forward": "forward speed",
-    "sideways": "speed to the left",
-    "turn": "turn rate",
-    "left": "left wheel speed",
-    "right": "right wheel speed",
-}
+NAMES: Mapping[str, str] = _TABLES["motions"]
 
 
 class Rates(NamedTuple):

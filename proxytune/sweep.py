@@ -138,10 +138,8 @@ def discrepancy_study(study: Study, model: Path) -> Study:
         raise InputError(f"--target-model {model}: no such file; check the path")
     proxy: Any = study.family
     if not (hasattr(proxy, "drive") and hasattr(proxy, "replay")):
-        raise InputError(
-            f"--target-model: family {study.settings.family} has no `drive` and `replay`, without which there is"
-            " no POD; leave the option out"
-        )
+        lacks = f"family {study.settings.family} has no `drive` and `replay`, without which there is no POD"
+        raise InputError(f"--target-model: {lacks}; leave the option out")
     target: Any = load_family(study.settings, model)
     both = Discrepancy(proxy, target)
     settings = replace(study.settings, agents=study.settings.agents[:1])
@@ -339,7 +337,6 @@ def series_of(curve: SweepCurve) -> tuple[Series, ...]:
 
 
 Side = Literal["worsens", "flat", "turns", "unknown", "unseen"]
-
 OUTWARDS: dict[Side, str] = {
     "worsens": "worsens monotonically within noise",
     "flat": "does not end up worse beyond noise",

@@ -60,7 +60,6 @@ def _terminate(number: int, frame: FrameType | None) -> None:
 
 
 FAILED = 1
-
 REMEDIES = {
     errno.EMFILE: "; allow more open files (ulimit -n 1024), or take fewer jobs",
     errno.ENFILE: "; close other programs, or take fewer jobs",

@@ -34,7 +34,6 @@ from proxytune.logs import COMMANDS
 from proxytune.settings import nearest
 
 Arrays = Mapping[str, NDArray[Any]]
-
 WIDEST = 16
 """An array of more columns is neither commands nor poses."""
 
@@ -64,10 +63,8 @@ def as_table(path: Path, arrays: Arrays, times: str) -> Table:
     names = named if times else usual_names("time", list(arrays))
     if len(names) != 1 or arrays[names[0]].ndim != 1:
         shapes = ", ".join(f"{name} {array.shape}" for name, array in arrays.items())
-        raise LogError(
-            f"{path}: which array (N,) holds the times is not clear; its arrays are: {shapes}; "
-            "say it, as in --columns time=timestamps:s"
-        )
+        unclear = f"which array (N,) holds the times is not clear; its arrays are: {shapes}"
+        raise LogError(f"{path}: {unclear}; say it, as in --columns time=timestamps:s")
     count = len(arrays[names[0]])
     if not count:
         raise LogError(f"{path}: its arrays are empty; record a drive")
@@ -157,20 +154,17 @@ def read_arrays(path: Path, wanted: Wanted) -> Source:
 def _check_wanted(table: Table, arrays: Arrays, wanted: Wanted) -> None:
     """Refuse --commands with a name, and arrays for commands and poses of another length than the times."""
     if wanted.commands not in ("", "none"):
-        raise LogError(
-            f"{table.path}: --commands {wanted.commands}: name arrays by column, as in --columns "
-            f"left={wanted.commands}[0],right={wanted.commands}[1]"
-        )
+        example = f"--columns left={wanted.commands}[0],right={wanted.commands}[1]"
+        raise LogError(f"{table.path}: --commands {wanted.commands}: name arrays by column, as in {example}")
     usual = {} if wanted.columns else {name: name for name in (*ACTIONS, *POSITIONS, *ANGLES)}
     if "none" in (wanted.commands, wanted.kind):
         usual = {name: name for name in usual if name not in ACTIONS}
     for field, entry in {**usual, **wanted.columns}.items():
         array = next((name for name in (entry, *(entry.split(mark)[0] for mark in ":[")) if name in arrays), "")
         if array and not any(name == array or name.startswith(f"{array}[") for name in table.names):
-            raise LogError(
-                f"{table.path}: {field}: array '{array}' is {arrays[array].shape} of {arrays[array].dtype}, "
-                f"but there are {len(table.cells)} times; give one number, or a short row of numbers, for each time"
-            )
+            other = f"is {arrays[array].shape} of {arrays[array].dtype}, but there are {len(table.cells)} times"
+            remedy = "give one number, or a short row of numbers, for each time"
+            raise LogError(f"{table.path}: {field}: array '{array}' {other}; {remedy}")
 
 
 def _gym_duckietown(table: Table, arrays: Arrays, wanted: Wanted) -> tuple[Table, dict[str, str], list[str]]:

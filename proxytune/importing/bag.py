@@ -24,7 +24,6 @@ from proxytune.settings import nearest
 ROS1 = ".bag"
 ROS2 = (".db3", ".mcap")
 METADATA = "metadata.yaml"
-
 REPAIR = {"ROS 1 bag": "rosbag reindex", "ROS 2 bag (mcap)": "mcap recover", "ROS 2 bag (sqlite3)": "ros2 bag reindex"}
 
 
@@ -200,10 +199,8 @@ def _clock_notes(header: Floats, received: Floats, where: str) -> tuple[str, ...
         reason = "messages took that long, or the clocks differ"
         notes.append(f"Messages of {where} were received {apart:.3f} s after their stamps, in the median: {reason}.")
     if apart < -APART_S:
-        notes.append(
-            f"Messages of {where} were received {-apart:.3f} s before their stamps, in the median: the clocks differ; "
-            "--stamps receive takes the bag's times."
-        )
+        early = f"Messages of {where} were received {-apart:.3f} s before their stamps, in the median"
+        notes.append(f"{early}: the clocks differ; --stamps receive takes the bag's times.")
     if abs(drift) > DRIFT_S:
         by = f"{1e3 * drift:+.0f} ms"
         notes.append(f"The clock of the headers of {where} drifts by {by} against the bag's over the drive.")

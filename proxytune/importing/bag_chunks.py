@@ -17,8 +17,6 @@ from proxytune.unpacking import BAG_MB, check_unpacked, unpacked_size
 
 DENSEST = 100
 """Times its own size: pictures of a world that stands still pack so well, and hardly anything else."""
-
-
 Chunk = tuple[str, bytes]
 """How bytes are packed, "bz2", "lz4" or "zstd", and the bytes."""
 

@@ -57,17 +57,14 @@ def clock_notes(drives: Sequence[Survey]) -> list[str]:
     early = [pair for pair in lags if pair[0] < 0.0]
     if early:
         lag, first = min(early)
-        return [
-            f"{len(early)} of {len(drives)} drives turn before they are told to (up to {-lag:.2f} s, {first}): two "
-            "clocks stamped commands and poses; diagnose corrects that, --clock-offset declares it"
-        ]
+        turn = f"{len(early)} of {len(drives)} drives turn before they are told to (up to {-lag:.2f} s, {first})"
+        remedy = "diagnose corrects that, --clock-offset declares it"
+        return [f"{turn}: two clocks stamped commands and poses; {remedy}"]
     if not lags:
         return ["no drive turns enough to tell whether commands and poses share a clock"]
     usual = float(np.median([lag for lag, _ in lags]))
-    return [
-        f"it turns {usual:.2f} s after its commands: delay, lag and an offset between the two clocks together, which "
-        "nothing here can tell apart"
-    ]
+    together = "delay, lag and an offset between the two clocks together, which nothing here can tell apart"
+    return [f"it turns {usual:.2f} s after its commands: {together}"]
 
 
 def rows_notes(drives: Sequence[Drive]) -> list[str]:

@@ -40,8 +40,6 @@ from proxytune.settings import nearest
 
 STEMS = ("commands", "cmd_vel", "cmd")
 COMMAND_SUFFIXES = (".csv", ".tsv", ".txt")
-
-
 CommandsOf = Mapping[str, Commands]
 """The commands of a file by the drive that it names, or "" where it names none."""
 
@@ -104,10 +102,8 @@ def _by_time(path: Path, commands: Commands, drives: Sequence[Drive]) -> list[Dr
     """Cut commands where drives begin and end; the one in force at a beginning belongs to the drive."""
     spans = sorted((drive.poses.times.min(), drive.poses.times.max()) for drive in drives)
     if any(end >= begin for (_, end), (begin, _) in itertools.pairwise(spans)):
-        raise LogError(
-            f"{path}: names no drives, and the drives overlap in time, so that commands cannot be shared out; "
-            "add a column 'episode', or give each drive a file of commands"
-        )
+        overlap = "names no drives, and the drives overlap in time, so that commands cannot be shared out"
+        raise LogError(f"{path}: {overlap}; add a column 'episode', or give each drive a file of commands")
     shared = []
     for drive in drives:
         begin, end = drive.poses.times.min(), drive.poses.times.max()
@@ -116,10 +112,8 @@ def _by_time(path: Path, commands: Commands, drives: Sequence[Drive]) -> list[Dr
         if len(before):
             during[before[np.argmax(commands.times[before])]] = True
         if not during.any():
-            raise LogError(
-                f"{path}: has no command while '{drive.name}' was driven, {begin:.12g} to {end:.12g} s; "
-                "check that both files have stamps of one clock"
-            )
+            none = f"has no command while '{drive.name}' was driven, {begin:.12g} to {end:.12g} s"
+            raise LogError(f"{path}: {none}; check that both files have stamps of one clock")
         own = replace(commands, times=commands.times[during], values=commands.values[during])
         shared.append(replace(drive, commands=own))
     return shared
@@ -217,9 +211,8 @@ def _columns(table: Table, wanted: Wanted, apart: Path | None) -> tuple[Columns,
     columns = choose_columns(table, stated, fields)
     found = set(COMMAND_FIELDS) & set(columns) - {ENABLED}
     if not found and "command_time" in wanted.columns:
-        raise LogError(
-            f"{table.path}: command_time is the clock of commands in the same table, which has none; leave it out"
-        )
+        none = "command_time is the clock of commands in the same table, which has none"
+        raise LogError(f"{table.path}: {none}; leave it out")
     if not own or (apart and not found):
         return {field: column for field, column in columns.items() if field not in COMMAND_FIELDS}, "none"
     if not found:

@@ -17,7 +17,6 @@ from proxytune.importing.source import Commands, finite
 KIND = "std_msgs/msg/Float64 of a VESC"
 """What the type of a motor's topic is called where its servo's stands beside it."""
 MOTOR, SERVO = "commands/motor/speed", "commands/servo/position"
-
 TOGETHER_S = 0.002
 """Two messages that come within this time are one command."""
 GAINS = tuple(f"{of}_{part}" for of in ("speed_to_erpm", "steering_angle_to_servo") for part in ("gain", "offset"))

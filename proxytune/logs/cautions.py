@@ -129,11 +129,9 @@ def _jumps(log: Log, drives: list[Chords]) -> Iterator[str]:
         usual = float(np.quantile(chords.speed, 0.9)) if len(chords.speed) >= ENOUGH else np.inf
         if chords.speed.max(initial=0.0) * CHORD_S > max(JUMP_M, JUMP * usual * CHORD_S):
             at = int(np.argmax(chords.speed))
-            yield (
-                f"drive '{episode.name}' jumps by {chords.speed[at] * CHORD_S:.2g} m "
-                f"after {chords.times[at] - chords.times[0]:.4g} s: "
-                "the tracker took something else for it, or two drives are one; cut there"
-            )
+            jump, after = chords.speed[at] * CHORD_S, chords.times[at] - chords.times[0]
+            why = "the tracker took something else for it, or two drives are one; cut there"
+            yield f"drive '{episode.name}' jumps by {jump:.2g} m after {after:.4g} s: {why}"
             return
 
 
@@ -175,11 +173,9 @@ def _frozen(log: Log, asked: Sequence[tuple[Floats, Floats]]) -> Iterator[str]:
         for first, end in zip(changes, ends, strict=True):
             lasts = float(times[end - 1] - times[first])
             if lasts > FROZEN_S and driving[first:end].mean() * lasts > FROZEN_S:
-                yield (
-                    f"drive '{episode.name}' keeps one pose to the last digit for {lasts:.2g} s, "
-                    f"from {times[first] - times[0]:.4g} s on, while its commands go on: "
-                    "a tracker that lost the robot; cut it there"
-                )
+                keeps = f"keeps one pose to the last digit for {lasts:.2g} s, from {times[first] - times[0]:.4g} s on"
+                why = "while its commands go on: a tracker that lost the robot; cut it there"
+                yield f"drive '{episode.name}' {keeps}, {why}"
                 return
 
 
@@ -202,18 +198,14 @@ def _turning(log: Log, drives: list[Chords]) -> Iterator[str]:
     if strongest > AGAINST and log.command == "twist" and not SLOWEST_TURN < gain < FASTEST_TURN:
         yield f"the robot turns {gain:.2g} times as fast as its commands say: check the unit of omega, rad/s"
     if strongest < -AGAINST:
-        yield (
-            f"the robot turns the other way than its commands say (correlation {strongest:.2f}): headings that grow "
-            "clockwise, a mirrored axis, or left and right exchanged"
-        )
+        why = "headings that grow clockwise, a mirrored axis, or left and right exchanged"
+        yield f"the robot turns the other way than its commands say (correlation {strongest:.2f}): {why}"
     if log.command in ("twist", *CAR_COMMANDS):
         driving, turning = COMMANDS[log.command]
         other, _ = _correlation(log, drives, [episode.held[:, 0] for episode in log.episodes])
         if abs(other) > EXCHANGED and abs(strongest) < AGAINST:
-            yield (
-                f"the robot turns with {driving} (correlation {other:.2f}) and not with {turning} ({strongest:.2f}): "
-                "are the two exchanged?"
-            )
+            both = f"{driving} (correlation {other:.2f}) and not with {turning} ({strongest:.2f})"
+            yield f"the robot turns with {both}: are the two exchanged?"
 
 
 def _correlation(log: Log, drives: list[Chords], turns: Sequence[Floats]) -> tuple[float, float]:

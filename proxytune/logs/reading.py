@@ -17,7 +17,6 @@ from proxytune.settings import GEOMETRY, Section, read_settings
 
 TEXTS = ("name", "robot", "pose", "source", "licence", "map", "frames")
 KEYS = ("format", *TEXTS, "command", "rate_hz", "clock_offset_s", "measured", "camera", *GEOMETRY)
-
 FIT = "fit"
 """What `clock_offset_s` says where the offset is to be fitted."""
 FURTHEST_S = 3600.0

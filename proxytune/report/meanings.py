@@ -20,7 +20,6 @@ CLAUSES: Mapping[str, str] = package_table("report/templates/clauses.toml") | {
     f"{effect}.imbalance": SHARED_OUT for effect in UNEVEN
 }
 """By name in θ: what a value says; {} stands for the value with its unit and interval."""
-
 WORSE = 2.0
 """From here on an error without an effect is told as so many times the one with it."""
 MOST_FITTED = 4

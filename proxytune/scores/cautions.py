@@ -27,7 +27,6 @@ SAME_LENGTH = 1.05
 CEILING = 0.1
 """A time limit is where at least this share of the episodes ends."""
 FEWEST_AT_CEILING = 3
-
 NAMED = ("agents", "episodes")
 SAME = "the proxy has the target's scores to the last digit; give another table, unless one is a copy on purpose"
 DISTINCT = 0.8
@@ -95,10 +94,8 @@ def _tolerances(table: ScoreTable, metrics: Sequence[Metric], side: str) -> Iter
         merits, tie = metric.merits(table.means[:, place])
         if metric.tolerance and varies(table.means)[place] and np.ptp(merits) <= tie[0]:
             percent = " %" if metric.percent else ""
-            yield (
-                f"the tolerance of {metric.name}, {metric.tolerance:g}{percent}, leaves no two agents of {side} apart: "
-                "all tie; give a smaller one"
-            )
+            given = f"the tolerance of {metric.name}, {metric.tolerance:g}{percent}"
+            yield f"{given}, leaves no two agents of {side} apart: all tie; give a smaller one"
 
 
 def _lengths(proxy: ScoreTable, target: ScoreTable, metrics: Sequence[Metric]) -> Iterator[str]:

@@ -197,21 +197,18 @@ def _explained(path: Path, problem: sqlite3.Error) -> StoreError:
     code = getattr(problem, "sqlite_errorcode", None) or 0
     match code & 0xFF:
         case sqlite3.SQLITE_FULL:
-            return StoreError(f"{path}: the disk is full; make room and run again, everything finished is kept")
+            why = "the disk is full; make room and run again, everything finished is kept"
         case sqlite3.SQLITE_IOERR:
-            return StoreError(
-                f"{path}: cannot be read or written ({problem}); is the disk full? Everything finished is kept"
-            )
+            why = f"cannot be read or written ({problem}); is the disk full? Everything finished is kept"
         case sqlite3.SQLITE_READONLY | sqlite3.SQLITE_CANTOPEN | sqlite3.SQLITE_PERM:
-            return StoreError(
-                f"{path}: cannot be written ({problem}); check the folder's permissions or copy the study"
-            )
+            why = f"cannot be written ({problem}); check the folder's permissions or copy the study"
         case sqlite3.SQLITE_BUSY | sqlite3.SQLITE_LOCKED:
-            return StoreError(f"{path}: another program holds it open for writing; close that and run again")
+            why = "another program holds it open for writing; close that and run again"
         case sqlite3.SQLITE_NOTADB | sqlite3.SQLITE_CORRUPT:
             return _corrupt(path, str(problem))
         case _:
-            return StoreError(f"{path}: {problem}; if it is damaged, restore a copy or move it away")
+            why = f"{problem}; if it is damaged, restore a copy or move it away"
+    return StoreError(f"{path}: {why}")
 
 
 def _corrupt(path: Path, detail: str) -> DamagedError:
@@ -259,10 +256,8 @@ def _refuse_programs(connection: sqlite3.Connection, path: Path) -> None:
     found = connection.execute(query).fetchone()
     if found:
         what, name = found
-        raise StoreError(
-            f"{path}: has a {what if what != 'table' else 'virtual table'} {name!r:.60}, which no proxytune made; "
-            "take its data only from who made it, or move it away"
-        )
+        has = f"has a {what if what != 'table' else 'virtual table'} {name!r:.60}, which no proxytune made"
+        raise StoreError(f"{path}: {has}; take its data only from who made it, or move it away")
 
 
 def _check_tables(connection: sqlite3.Connection, path: Path, version: int) -> None:

@@ -40,8 +40,6 @@ LINEAR = 20.0
 """Evidence of no more than so many thresholds is drawn on a linear axis."""
 ROW, ELSE = 0.145, 0.95
 """Height of a row, and of all else [inch]."""
-
-
 ADDED = style.Role("added", style.BLUE)
 RIVAL = style.Role("fits as well as one added", style.LIGHT_BLUE)
 OTHER = style.Role("not added", style.GREY)

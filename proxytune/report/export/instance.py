@@ -165,14 +165,10 @@ def xml_comment(instance: Instance, form: str, columns: int) -> str:
 
 FORMATS = ("urdf", "mjcf", "ros")
 """Formats that can be written, as `export --to` calls it."""
-
 FILTER = "filter"
 """What `export --to` calls the ROS 2 node that bends commands as was found."""
-
 IN_WHEELS = ("trim", "wheel_gain", "yaw_scrub")
 """Effects that a patched file has by its wheels' radii and distance; what such a file has is undone by a filter."""
-
-
 _TABLES = package_table("report/templates/places.toml")
 _MOUNTED = {effect: places for places in _TABLES.pop("mounted") for effect in places["effects"]}
 PLACES: Mapping[str, Mapping[str, Mapping[str, str]]] = {drive: own | _MOUNTED for drive, own in _TABLES.items()}

@@ -109,10 +109,8 @@ def complaint(quaternions: Floats, wrong: Flags, where: str) -> LogError:
     """The complaint about the first of those that are wrong."""
     number = int(np.argmax(wrong))
     values = ", ".join(f"{value:g}" for value in quaternions[number])
-    return LogError(
-        f"{where}: orientation {number + 1} is the quaternion ({values}), which is no rotation, and so are "
-        f"{wrong.sum()} of {len(wrong)}; record poses whose orientation is set"
-    )
+    others = f"which is no rotation, and so are {wrong.sum()} of {len(wrong)}; record poses whose orientation is set"
+    return LogError(f"{where}: orientation {number + 1} is the quaternion ({values}), {others}")
 
 
 FURTHEST_BACK_S = 0.5
@@ -132,10 +130,9 @@ def checked_drive(drive: Drive, where: str, offset_s: float = 0.0) -> tuple[Driv
     poses, notes = _ordered_poses(drive.poses, about)
     tilt, spans = math.degrees(float(np.median(poses.tilts))), np.ptp(poses.places, axis=0)
     if tilt > TILT_DEG:
-        raise LogError(
-            f"{about}: the robot's z axis lies {tilt:.0f}° from the world's for half of the drive; poses must be z-up "
-            "(x forward, y left): turn the rigid body or the world in the tracker, and export again"
-        )
+        lies = f"the robot's z axis lies {tilt:.0f}° from the world's for half of the drive"
+        remedy = "turn the rigid body or the world in the tracker, and export again"
+        raise LogError(f"{about}: {lies}; poses must be z-up (x forward, y left): {remedy}")
     if spans[2] > FLAT_M and spans[2] > spans[:2].min():
         other = f"{'xy'[int(spans[:2].argmin())]} only by {spans[:2].min():.2f} m"
         remedy = "the world is not z-up; export poses with z upwards"

@@ -217,10 +217,8 @@ def _columns(table: Table, wanted: Wanted, apart: Path | None) -> tuple[Columns,
         return {field: column for field, column in columns.items() if field not in COMMAND_FIELDS}, "none"
     if not found:
         pose_fields(table, columns)
-        raise LogError(
-            f"{table.path}: no column of commands found; its columns are: {', '.join(table.names)}; say which they are "
-            f"({EXAMPLE}), name their file (--commands FILE), or leave them out (--commands none)"
-        )
+        none = f"no column of commands found; its columns are: {', '.join(table.names)}; say which they are ({EXAMPLE})"
+        raise LogError(f"{table.path}: {none}, name their file (--commands FILE), or leave them out (--commands none)")
     return with_commands(columns, wanted.kind, table)
 
 
@@ -304,10 +302,9 @@ def _read_one(path: Path, wanted: Wanted) -> Source:
         return source
     file = find_commands(path, wanted)
     if file is None:
-        raise LogError(
-            f"{path}: a TUM file holds no commands; lay {path.stem}_commands.csv (time, v, omega) beside it, name "
-            "another file with --commands FILE, or write --commands none for a log without them"
-        )
+        lay = f"lay {path.stem}_commands.csv (time, v, omega) beside it, name another file with --commands FILE"
+        none = "or write --commands none for a log without them"
+        raise LogError(f"{path}: a TUM file holds no commands; {lay}, {none}")
     commands, channels, note = read_commands(file, wanted)
     return replace(
         source,

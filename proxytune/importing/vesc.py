@@ -59,10 +59,9 @@ def read_vesc(bag: Bag, motor: str, gains: Path | None) -> tuple[Commands, tuple
     union = union[np.diff(union, append=np.inf) > TOGETHER_S]
     erpm, servo = (of[np.searchsorted(at, union, side="right") - 1] for at, of in zip(times, held, strict=True))
     columns = ((erpm - speed_offset) / speed_gain, (servo - servo_offset) / servo_gain)
-    note = (
-        f"{servo_of(motor)} is the steering; speed is (erpm {-speed_offset:+g}) / {speed_gain:g}, the wheels' angle "
-        f"(servo {-servo_offset:+g}) / {servo_gain:g}, by {gains}; times are when the bag received each message."
-    )
+    speed = f"speed is (erpm {-speed_offset:+g}) / {speed_gain:g}"
+    angle = f"the wheels' angle (servo {-servo_offset:+g}) / {servo_gain:g}, by {gains}"
+    note = f"{servo_of(motor)} is the steering; {speed}, {angle}; times are when the bag received each message."
     return Commands("speed_steering", union, np.column_stack(columns)), (note,)
 
 

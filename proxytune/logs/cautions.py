@@ -111,16 +111,12 @@ def _axes(drives: list[Chords]) -> Iterator[str]:
         float(np.abs(np.mean(np.exp(2j * angle)))) for angle in (course - heading, course + heading, heading)
     )
     if spread < TURNED and together < MISFITS and mirrored > FITS:
-        yield (
-            "places are mirrored against headings: the robot moves where a mirror image of it points; reverse x or y, "
-            "or exchange them, so that headings turn from x to y"
-        )
+        remedy = "reverse x or y, or exchange them, so that headings turn from x to y"
+        yield f"places are mirrored against headings: the robot moves where a mirror image of it points; {remedy}"
     askew = math.degrees(float(np.angle(np.mean(np.exp(2j * (course - heading)))))) / 2.0
     if spread < TURNED and together > FITS and abs(askew) > ASKEW_DEG:
-        yield (
-            f"the robot moves at {abs(askew):.0f}° to where its headings point: headings grow from x to y and are 0 "
-            "along x; turn them, or the places"
-        )
+        remedy = "headings grow from x to y and are 0 along x; turn them, or the places"
+        yield f"the robot moves at {abs(askew):.0f}° to where its headings point: {remedy}"
 
 
 def _jumps(log: Log, drives: list[Chords]) -> Iterator[str]:

@@ -172,18 +172,14 @@ def _check_overlap(samples: Rows, rows: Rows, issued: Mapping[str, Issued], offs
     lasts = np.append(samples.firsts[1:], len(samples.lines)) - 1
     for name, first, last in zip(samples.names, samples.firsts, lasts, strict=True):
         if name not in issued:
-            raise samples.error(
-                int(first), "episode", f"'{name}' is not in commands.csv; add its commands, or leave it out"
-            )
+            problem = f"'{name}' is not in commands.csv; add its commands, or leave it out"
+            raise samples.error(int(first), "episode", problem)
         begin, end = samples.values["time"][[first, last]]
         own = issued[name][0] + offset_s
         if own[0] >= end or own[-1] < begin:
             row = int(rows.firsts[rows.names.index(name)])
-            problem = (
-                f"the commands of '{name}' lie between {own[0]:.12g} and {own[-1]:.12g} s, its poses between "
-                f"{begin:.12g} and {end:.12g} s; write both in seconds of one clock"
-            )
-            raise rows.error(row, "time", problem)
+            lie = f"lie between {own[0]:.12g} and {own[-1]:.12g} s, its poses between {begin:.12g} and {end:.12g} s"
+            raise rows.error(row, "time", f"the commands of '{name}' {lie}; write both in seconds of one clock")
 
 
 SIZES: Mapping[str, tuple[str, float, str]] = {

@@ -71,10 +71,8 @@ def _copies(table: ScoreTable, side: str) -> Iterator[str]:
     pooled = len(np.unique(np.concatenate(distinct), axis=0))
     kept = sum(map(len, distinct))
     if np.mean(repeated) >= 0.75 and pooled >= max(DISTINCT * kept, 4):
-        yield (
-            f"of {table.counts.sum()} episodes of {side} only {kept} differ from one another: the others are copies to "
-            "the last digit; give each once, or intervals come out too narrow"
-        )
+        few = f"of {table.counts.sum()} episodes of {side} only {kept} differ from one another"
+        yield f"{few}: the others are copies to the last digit; give each once, or intervals come out too narrow"
 
 
 def _signs(proxy: ScoreTable, target: ScoreTable, metrics: Sequence[Metric]) -> Iterator[str]:
@@ -112,10 +110,8 @@ def _lengths(proxy: ScoreTable, target: ScoreTable, metrics: Sequence[Metric]) -
         factor = max(most, other) / min(most, other) if min(most, other) > 0.0 else 1.0
         other_unit = any(abs(factor / unit - 1.0) < 0.02 for unit in (60.0, 1e3, 1e6, 1e9))
         if shorter and factor > SAME_LENGTH and not other_unit:
-            yield (
-                f"episodes last up to {most:.4g} in the proxy and up to {other:.4g} on the target by {metric.name}; "
-                "give both sides one time limit, or scores that grow with time cannot be compared"
-            )
+            last = f"episodes last up to {most:.4g} in the proxy and up to {other:.4g} on the target by {metric.name}"
+            yield f"{last}; give both sides one time limit, or scores that grow with time cannot be compared"
 
 
 def _units(proxy: ScoreTable, target: ScoreTable, metrics: Sequence[Metric], *, alone: bool) -> Iterator[str]:

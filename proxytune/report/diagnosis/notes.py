@@ -164,11 +164,10 @@ def _say_clocks(clocks: Clocks) -> Iterator[str]:
         yield f"{lag}; {stamped} if the robot's delay is {assumed:.2f} s; {corrected}"
     if clocks.drift.value:
         low, high = sorted(1e2 * abs(end) for end in clocks.drift.interval)
-        yield (
-            f"the poses' clock runs {1e2 * abs(clocks.drift.value):.2g} % ({low:.2g} to {high:.2g}) "
-            f"{'faster' if clocks.drift.value > 0.0 else 'slower'} than that of the commands; this was corrected. "
-            "Stamp both with one clock, or synchronise them"
-        )
+        runs = f"{1e2 * abs(clocks.drift.value):.2g} % ({low:.2g} to {high:.2g})"
+        way = f"{'faster' if clocks.drift.value > 0.0 else 'slower'} than that of the commands"
+        corrected = "this was corrected. Stamp both with one clock, or synchronise them"
+        yield f"the poses' clock runs {runs} {way}; {corrected}"
     for name, one in clocks.drives.items():
         stamped = f"{abs(one.value):.2f} s {'earlier' if one.value < 0.0 else 'later'} ({_ends_s(one)})"
         others = f"in drive {name} poses are stamped {stamped} than in the others"

@@ -7,7 +7,6 @@ from pprint import pformat
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from proxytune.arrays import Floats
 from proxytune.diagnosis import Diagnosis, commands_as
 from proxytune.driving import REQUIRED, CameraFigures, Robot
 from proxytune.effects import effect_of, is_learnt
@@ -28,7 +27,11 @@ def ros_text(instance: Instance) -> str:
     parts = [_car(instance) if instance.steers else _wheels(instance)]
     if (camera := instance.camera) is not None:
         parts.append(_camera_info(camera))
-    parts += [_transform(child, pose) for child, pose in instance.mounts.items()]
+    # Parameters of tf2_ros' static_transform_publisher; base_link is the middle of the axle, on the floor.
+    for child, pose in instance.mounts.items():
+        numbers = (*pose[:3, 3].tolist(), *Rotation.from_matrix(pose[:3, :3]).as_quat(canonical=True).tolist())
+        names = ("x", "y", "z", "qx", "qy", "qz", "qw")
+        parts.append(_filled("ros_transform", child=child, **dict(zip(names, numbers, strict=True))))
     return "".join([*(f"# {line}\n" for line in header(instance, "ros")), *parts])
 
 
@@ -73,13 +76,6 @@ def _camera_info(figures: CameraFigures) -> str:
     size = {"columns": str(figures.columns), "rows": str(figures.rows)}
     numbers = {"k1": figures.k1, "across": focal * figures.aspect, "right": right, "focal": focal, "down": down}
     return _filled("ros_camera", **size, **numbers)
-
-
-def _transform(child: str, pose: Floats) -> str:
-    """Parameters of tf2_ros' static_transform_publisher; base_link is the middle of the axle, on the floor."""
-    numbers = (*pose[:3, 3].tolist(), *Rotation.from_matrix(pose[:3, :3]).as_quat(canonical=True).tolist())
-    names = ("x", "y", "z", "qx", "qy", "qz", "qw")
-    return _filled("ros_transform", child=child, **dict(zip(names, numbers, strict=True)))
 
 
 def _filled(template: str, **values: float | str) -> str:

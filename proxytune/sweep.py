@@ -7,6 +7,7 @@ a measure is best, and whether it gets worse on both sides of where it was held.
 """
 
 import functools
+import itertools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -15,6 +16,8 @@ from typing import Any, Literal, Protocol
 
 import numpy as np
 
+from proxytune import usefulness
+from proxytune.arrays import Floats
 from proxytune.domain import DomainFamily, Episode
 from proxytune.errors import InputError, SettingsError
 from proxytune.identity import digest
@@ -32,18 +35,7 @@ from proxytune.study import (
     result_of,
     stored_run,
 )
-from proxytune.usefulness import (
-    ALL,
-    MEASURES,
-    PODS,
-    Assessment,
-    Measure,
-    Measured,
-    assess,
-    interval as central_interval,
-    pod_of_images,
-    pod_of_poses,
-)
+from proxytune.usefulness import ALL, MEASURES, PODS, Assessment, Measure, Measured, assess
 
 
 def has_answer(study: Study) -> bool:
@@ -128,8 +120,8 @@ class Discrepancy:
         here = self.proxy.replay(episode, commands)
         poses, pictures = (min(map(len, both)) for both in ((here.poses, there.poses), (here.pictures, there.pictures)))
         # The start is the same by construction, so it is no observation.
-        pose = pod_of_poses(proxy=here.poses[1:poses], target=there.poses[1:poses])
-        image = pod_of_images(proxy=here.pictures[:pictures], target=there.pictures[:pictures])
+        pose = usefulness.pod_of_poses(proxy=here.poses[1:poses], target=there.poses[1:poses])
+        image = usefulness.pod_of_images(proxy=here.pictures[:pictures], target=there.pictures[:pictures])
         return {"pod_pose": pose, "pod_image": image}
 
 
@@ -146,10 +138,8 @@ def discrepancy_study(study: Study, model: Path) -> Study:
         raise InputError(f"--target-model {model}: no such file; check the path")
     proxy: Any = study.family
     if not (hasattr(proxy, "drive") and hasattr(proxy, "replay")):
-        raise InputError(
-            f"--target-model: family {study.settings.family} has no `drive` and `replay`, without which there is"
-            " no POD; leave the option out"
-        )
+        lacks = f"family {study.settings.family} has no `drive` and `replay`, without which there is no POD"
+        raise InputError(f"--target-model: {lacks}; leave the option out")
     target: Any = load_family(study.settings, model)
     both = Discrepancy(proxy, target)
     settings = replace(study.settings, agents=study.settings.agents[:1])
@@ -269,7 +259,7 @@ def pod_mean(values: Sequence[float], *, seed: int = 0) -> PodMean:
     if len(found) < 2:
         return PodMean(float(found.mean()), None, len(found))
     draws = np.random.default_rng(seed).integers(len(found), size=(RESAMPLES, len(found)))
-    return PodMean(float(found.mean()), central_interval(found[draws].mean(axis=1)), len(found))
+    return PodMean(float(found.mean()), usefulness.interval(found[draws].mean(axis=1)), len(found))
 
 
 def all_curves(run: StudyRun) -> Sequence[SweepCurve]:
@@ -347,7 +337,6 @@ def series_of(curve: SweepCurve) -> tuple[Series, ...]:
 
 
 Side = Literal["worsens", "flat", "turns", "unknown", "unseen"]
-
 OUTWARDS: dict[Side, str] = {
     "worsens": "worsens monotonically within noise",
     "flat": "does not end up worse beyond noise",
@@ -384,28 +373,20 @@ class Shape:
         return True if seen == {"worsens"} else None
 
 
-@dataclass(frozen=True)
-class _Cost:
-    """A point whose scores are turned such that lower is better."""
-
-    value: float
-    cost: float
-    low: float
-    high: float
-
-
 def shape_of(series: Series, held: float | None) -> Shape:
     """Describe one measure round the value at which its parameter is held, as a pure function."""
     sign = 1.0 if series.measure.lower_is_better else -1.0
-    costs = [cost for value, one in series.estimates.items() if (cost := _cost(value, one, sign))]
-    if not costs:
+    known = {value: one for value, one in series.estimates.items() if one.value is not None}
+    if not known:
         return Shape((), None, (), held, "unseen", "unseen")
-    least = min(cost.cost for cost in costs)
-    best = [cost for cost in costs if cost.cost == least]
-    margin = max(cost.high for cost in best)
-    near = tuple(cost.value for cost in costs if cost.low <= margin)
-    sides = (_side(costs[::-1], held, -1), _side(costs, held, 1))
-    return Shape(tuple(cost.value for cost in best), sign * least + 0.0, near, held, *sides)
+    # Turned such that lower is better.
+    costs = sign * np.array([one.value for one in known.values()])
+    ends = sign * np.array([one.interval or (-math.inf, math.inf) for one in known.values()])
+    lows, highs = np.minimum(costs, ends.min(axis=1)), np.maximum(costs, ends.max(axis=1))
+    values, best = list(known), costs == costs.min()
+    at_best, near_best = (tuple(itertools.compress(values, mask)) for mask in (best, lows <= highs[best].max()))
+    sides = (_side(values[::-1], lows[::-1], highs[::-1], held), _side(values, lows, highs, held))
+    return Shape(at_best, sign * float(costs.min()) + 0.0, near_best, held, *sides)
 
 
 def describe_shape(series: Series, held: float | None) -> str:
@@ -436,23 +417,14 @@ def _number(value: float) -> str:
     return f"{value:.4g}".replace("-", "−")
 
 
-def _cost(value: float, measured: Measured, sign: float) -> _Cost | None:
-    if measured.value is None:
-        return None
-    cost = sign * measured.value
-    low, high = sorted(sign * end for end in measured.interval or (-math.inf, math.inf))
-    return _Cost(value, cost, min(low, cost), max(high, cost))
-
-
-def _side(costs: Sequence[_Cost], held: float | None, direction: int) -> Side:
+def _side(values: list[float], lows: Floats, highs: Floats, held: float | None) -> Side:
     """The course outwards of the held value; the points come in outward order."""
-    if held is None or not any(cost.value == held for cost in costs):
+    if held is None or held not in values[:-1]:
         return "unseen"
-    path = [cost for cost in costs if direction * (cost.value - held) >= 0]
-    if len(path) < 2:
-        return "unseen"
-    if any(later.high < earlier.low for place, earlier in enumerate(path) for later in path[place + 1 :]):
+    begin = values.index(held)
+    lows, highs = lows[begin:], highs[begin:]
+    if (highs[1:] < np.maximum.accumulate(lows)[:-1]).any():
         return "turns"
-    if math.inf in (path[0].high, path[-1].high):
+    if math.inf in (highs[0], highs[-1]):
         return "unknown"
-    return "worsens" if path[-1].low > path[0].high else "flat"
+    return "worsens" if lows[-1] > highs[0] else "flat"

@@ -14,7 +14,6 @@ from proxytune.report import write_picture, write_text
 from proxytune.study import StudySettings, bare_family, cautions_of
 
 Tell = Callable[[str], None]
-
 LONGEST_S = 3600.0
 """A longer drive of a table is a slip of its times, and would never end."""
 
@@ -62,10 +61,8 @@ def record_log(
     table = None if wanted.commands is None else read_commands(wanted.commands)
     for drive, (times, _) in () if table is None else table[1].items():
         if (lasts := times[-1] - times[0]) > LONGEST_S:
-            raise LogError(
-                f"{wanted.commands}: drive '{drive}' lasts {lasts:g} s; cut it into drives of at most {LONGEST_S:g} s, "
-                "or check its times"
-            )
+            remedy = f"cut it into drives of at most {LONGEST_S:g} s, or check its times"
+            raise LogError(f"{wanted.commands}: drive '{drive}' lasts {lasts:g} s; {remedy}")
     repeats, seconds, seed = wanted.repeats, wanted.seconds, wanted.seed
     log = record(family, name=folder.name, repeats=repeats, seconds=seconds, seed=seed, table=table)
     if wanted.frames:

@@ -207,9 +207,8 @@ def score(  # type: ignore[misc]  # the options above are those below
     if seed < 0:
         raise InputError(f"seed must be at least 0, got {seed}")
     if not usefulness.FEWEST_RESAMPLES <= resamples <= usefulness.MOST_RESAMPLES:
-        raise InputError(
-            f"resamples must be between {usefulness.FEWEST_RESAMPLES} and {usefulness.MOST_RESAMPLES}, got {resamples}"
-        )
+        between = f"{usefulness.FEWEST_RESAMPLES} and {usefulness.MOST_RESAMPLES}"
+        raise InputError(f"resamples must be between {between}, got {resamples}")
     if (both is None) == (proxy is None) or (proxy is None) != (target is None):
         raise InputError("give the proxy's and the target's scores, or one table of both sides")
     names, header = ("proxy", "target") if both is None else ("sim", "real"), _header(target if both is None else both)

@@ -10,7 +10,7 @@ from rich.text import Text
 from proxytune.api import DiagnosisReport
 from proxytune.cli.commands import names_in
 from proxytune.cli.options import facts_of, typed, wanted_of
-from proxytune.cli.terminal import Answer, Steps
+from proxytune.cli.terminal import Answer, steps
 from proxytune.diagnosis import Limits, diagnose_log, forget_stages, robot_of
 from proxytune.effects import Catalogue
 from proxytune.errors import InputError
@@ -54,7 +54,7 @@ def run(arguments: argparse.Namespace) -> Answer:
             check_place(folder / name, ours=True)
         robot = robot_of(log, arguments.robot, Catalogue(Path.cwd(), names_in(arguments.effects)))
         declared = None if arguments.declared is None else names_in(arguments.declared)
-        with Steps(shares(log)) as step:
+        with steps(shares(log)) as step:
             seed = arguments.seed
             found = diagnose_log(log, robot, declared, test=test, seed=seed, report=step, limits=limits, folder=folder)
             step("drawing")

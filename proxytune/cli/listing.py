@@ -110,9 +110,8 @@ def _effects() -> list[Row]:
             row: Row = {"effect": name, "stage": effect.stage.value, "parameter": theta_name, "unit": parameter.unit}
             first, last = parameter.usual_range
             row |= {"low": parameter.low, "high": parameter.high, "usual_low": first, "usual_high": last}
-            row |= {"neutral": parameter.neutral}
-            row |= {"declared": "yes" if name in catalogue.declared else "", "source": parameter.source}
-            rows.append(row | {"of": "" if catalogue is SHIPPED else "car"})
+            row |= {"neutral": parameter.neutral, "declared": "yes" if name in catalogue.declared else ""}
+            rows.append(row | {"source": parameter.source, "of": "" if catalogue is SHIPPED else "car"})
     return rows
 
 

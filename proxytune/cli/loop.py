@@ -8,7 +8,7 @@ from contextlib import AbstractContextManager
 
 from proxytune.cli.diagnose import shares
 from proxytune.cli.options import check_made, study_folder, typed
-from proxytune.cli.terminal import Answer, Steps
+from proxytune.cli.terminal import Answer, steps
 from proxytune.files import check_place
 from proxytune.logs import Log
 from proxytune.loop import Teller, run_loop, text_of
@@ -48,4 +48,4 @@ class Terminal(Teller):
 
     def diagnosis(self, log: Log) -> AbstractContextManager[Callable[[str], None]]:
         """The steps of a diagnosis."""
-        return Steps(shares(log))
+        return steps(shares(log))

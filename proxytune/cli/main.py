@@ -19,10 +19,7 @@ from proxytune.starting import UNDER_WAY, lasting_stderr
 
 DONE, BAD_INPUT = 0, 2
 FORMATS = ("png", "svg", "pdf")
-
-
 LACKING = (errno.EMFILE, errno.ENFILE, errno.ENOMEM, errno.ENOSPC)
-
 EXIT_STATUS = "exit status: 0 done, 1 failed, 2 bad input, 129 hung up, 130 interrupted (Ctrl-C), 143 terminated"
 
 

@@ -1,7 +1,7 @@
 """Output of every command, one JSON document or the same for people, its progress, and the signals that end it.
 
 Standard output holds a command's answer and nothing else: what agents print goes to standard error. Progress of unknown
-length is a spinner on a terminal (`waiting`), of steps a bar (`Steps`); elsewhere it is lines.
+length is a spinner on a terminal (`waiting`), of steps a bar (`steps`); elsewhere it is lines.
 """
 
 import errno
@@ -60,7 +60,6 @@ def _terminate(number: int, frame: FrameType | None) -> None:
 
 
 FAILED = 1
-
 REMEDIES = {
     errno.EMFILE: "; allow more open files (ulimit -n 1024), or take fewer jobs",
     errno.ENFILE: "; close other programs, or take fewer jobs",
@@ -142,24 +141,16 @@ def waiting(what: str) -> Iterator[Callable[[str], None]]:
         yield tell
 
 
-class Steps:
-    """Shows each step as it begins; use as a context."""
+@contextmanager
+def steps(shares: Mapping[str, float]) -> Iterator[Callable[[str], None]]:
+    """Show each step as it begins: of each beginning of a step's line is told what share of the time is over then."""
+    lines = Lines()
+    with progress_bar(lines.console, speed_estimate_period=3600.0) as bar:
+        task = bar.add_task("", total=1.0)
 
-    def __init__(self, shares: Mapping[str, float]) -> None:
-        """Begin with nothing done; of each beginning of a step's line is told what share of the time is over then."""
-        self._shares, self._lines = shares, Lines()
-        self._bar = progress_bar(self._lines.console, speed_estimate_period=3600.0)
-        self._task = self._bar.add_task("", total=1.0)
+        def begin(step: str) -> None:
+            lines.say(step)
+            share = max((over for start, over in shares.items() if step.startswith(start)), default=0.0)
+            bar.update(task, description=step, completed=max(share, bar.tasks[0].completed))  # It never goes back
 
-    def __enter__(self) -> "Steps":
-        self._bar.start()
-        return self
-
-    def __exit__(self, *problem: object) -> None:
-        self._bar.stop()
-
-    def __call__(self, step: str) -> None:
-        """Show that a step begins; the bar never goes back."""
-        self._lines.say(step)
-        share = max((over for begin, over in self._shares.items() if step.startswith(begin)), default=0.0)
-        self._bar.update(self._task, description=step, completed=max(share, self._bar.tasks[0].completed))
+        yield begin

@@ -34,7 +34,6 @@ from proxytune.logs import COMMANDS
 from proxytune.settings import nearest
 
 Arrays = Mapping[str, NDArray[Any]]
-
 WIDEST = 16
 """An array of more columns is neither commands nor poses."""
 
@@ -45,8 +44,6 @@ def load_arrays(path: Path) -> Arrays:
         arrays = unpacking.read_arrays(path)
     except InputError:
         raise
-    except FileNotFoundError:
-        raise LogError(f"{path}: no such file; check the path") from None
     except Exception as problem:  # A damaged file fails in many ways: zipfile's, zlib's and numpy's own.
         if "pickle" in str(problem):
             raise LogError(f"{path}: holds pickled objects; save plain arrays of numbers with numpy.savez") from None
@@ -66,10 +63,8 @@ def as_table(path: Path, arrays: Arrays, times: str) -> Table:
     names = named if times else usual_names("time", list(arrays))
     if len(names) != 1 or arrays[names[0]].ndim != 1:
         shapes = ", ".join(f"{name} {array.shape}" for name, array in arrays.items())
-        raise LogError(
-            f"{path}: which array (N,) holds the times is not clear; its arrays are: {shapes}; "
-            "say it, as in --columns time=timestamps:s"
-        )
+        unclear = f"which array (N,) holds the times is not clear; its arrays are: {shapes}"
+        raise LogError(f"{path}: {unclear}; say it, as in --columns time=timestamps:s")
     count = len(arrays[names[0]])
     if not count:
         raise LogError(f"{path}: its arrays are empty; record a drive")
@@ -83,11 +78,8 @@ def as_table(path: Path, arrays: Arrays, times: str) -> Table:
 
 def _flattened(name: str, array: NDArray[Any], count: int) -> dict[str, NDArray[Any]]:
     """The columns of an array; none where it is of another length or does not hold numbers."""
-    if (
-        array.ndim not in (1, 2)
-        or len(array) != count
-        or array.dtype.kind not in ("iufU" if array.ndim == 1 else "iuf")
-    ):
+    kinds = "iufU" if array.ndim == 1 else "iuf"
+    if array.ndim not in (1, 2) or len(array) != count or array.dtype.kind not in kinds:
         return {}
     if array.ndim == 1:
         return {name: array}
@@ -162,20 +154,17 @@ def read_arrays(path: Path, wanted: Wanted) -> Source:
 def _check_wanted(table: Table, arrays: Arrays, wanted: Wanted) -> None:
     """Refuse --commands with a name, and arrays for commands and poses of another length than the times."""
     if wanted.commands not in ("", "none"):
-        raise LogError(
-            f"{table.path}: --commands {wanted.commands}: name arrays by column, as in --columns "
-            f"left={wanted.commands}[0],right={wanted.commands}[1]"
-        )
+        example = f"--columns left={wanted.commands}[0],right={wanted.commands}[1]"
+        raise LogError(f"{table.path}: --commands {wanted.commands}: name arrays by column, as in {example}")
     usual = {} if wanted.columns else {name: name for name in (*ACTIONS, *POSITIONS, *ANGLES)}
     if "none" in (wanted.commands, wanted.kind):
         usual = {name: name for name in usual if name not in ACTIONS}
     for field, entry in {**usual, **wanted.columns}.items():
         array = next((name for name in (entry, *(entry.split(mark)[0] for mark in ":[")) if name in arrays), "")
         if array and not any(name == array or name.startswith(f"{array}[") for name in table.names):
-            raise LogError(
-                f"{table.path}: {field}: array '{array}' is {arrays[array].shape} of {arrays[array].dtype}, "
-                f"but there are {len(table.cells)} times; give one number, or a short row of numbers, for each time"
-            )
+            other = f"is {arrays[array].shape} of {arrays[array].dtype}, but there are {len(table.cells)} times"
+            remedy = "give one number, or a short row of numbers, for each time"
+            raise LogError(f"{table.path}: {field}: array '{array}' {other}; {remedy}")
 
 
 def _gym_duckietown(table: Table, arrays: Arrays, wanted: Wanted) -> tuple[Table, dict[str, str], list[str]]:

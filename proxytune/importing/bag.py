@@ -24,7 +24,6 @@ from proxytune.settings import nearest
 ROS1 = ".bag"
 ROS2 = (".db3", ".mcap")
 METADATA = "metadata.yaml"
-
 REPAIR = {"ROS 1 bag": "rosbag reindex", "ROS 2 bag (mcap)": "mcap recover", "ROS 2 bag (sqlite3)": "ros2 bag reindex"}
 
 
@@ -78,21 +77,6 @@ class Bag:
             yield receive_ns, message
 
 
-def is_bag(path: Path) -> bool:
-    """True if a path is a ROS bag, or a folder of several."""
-    return bool(_bags_in(path))
-
-
-def bags_in(path: Path) -> dict[str, Path]:
-    """The bags that a path holds, by the names of their drives."""
-    if not path.exists():
-        raise LogError(f"{path}: no such file; check the path")
-    bags = _bags_in(path)
-    if not bags:
-        raise LogError(f"{path}: holds no bag; give a .bag, .db3 or .mcap file, or a folder of bags")
-    return bags
-
-
 @contextmanager
 def open_bag(path: Path) -> Iterator[Bag]:
     """Open a bag while it is read."""
@@ -142,7 +126,8 @@ def complaints(path: Path, what: str) -> Iterator[None]:
         raise LogError(f"{path}: {what} ({reason}); {remedy}") from None
 
 
-def _bags_in(path: Path) -> dict[str, Path]:
+def bags_in(path: Path) -> dict[str, Path]:
+    """The bags that a path is or holds, by the names of their drives; none where it is of another form."""
     if _is_one(path):
         return {_name_of(path): path}
     bags: dict[str, Path] = {}
@@ -214,10 +199,8 @@ def _clock_notes(header: Floats, received: Floats, where: str) -> tuple[str, ...
         reason = "messages took that long, or the clocks differ"
         notes.append(f"Messages of {where} were received {apart:.3f} s after their stamps, in the median: {reason}.")
     if apart < -APART_S:
-        notes.append(
-            f"Messages of {where} were received {-apart:.3f} s before their stamps, in the median: the clocks differ; "
-            "--stamps receive takes the bag's times."
-        )
+        early = f"Messages of {where} were received {-apart:.3f} s before their stamps, in the median"
+        notes.append(f"{early}: the clocks differ; --stamps receive takes the bag's times.")
     if abs(drift) > DRIFT_S:
         by = f"{1e3 * drift:+.0f} ms"
         notes.append(f"The clock of the headers of {where} drifts by {by} against the bag's over the drive.")
@@ -256,11 +239,7 @@ def collect(bag: Bag, topic: str, row_of: Callable[[Any], Row], *, finite: bool 
 
 def read_commands(bag: Bag, topic: str, kind: str, stamps: str) -> tuple[Commands, tuple[str, ...]]:
     """The commands of a topic, and what there is to say of their times."""
-
-    def row_of(message: Any) -> Row:
-        return COMMAND_TYPES[message.__msgtype__.rpartition("/")[2]][1](message)
-
-    both, values = collect(bag, topic, row_of)
+    both, values = collect(bag, topic, lambda said: COMMAND_TYPES[said.__msgtype__.rpartition("/")[2]][1](said))
     times, notes = choose_times(both, stamps, topic)
     return Commands(kind, times, values), notes
 

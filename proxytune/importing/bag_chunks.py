@@ -10,20 +10,15 @@ import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from pathlib import Path
-from typing import IO, Any, NamedTuple
+from typing import IO, Any
 
 from proxytune.settings import allowed_bytes
 from proxytune.unpacking import BAG_MB, check_unpacked, unpacked_size
 
 DENSEST = 100
 """Times its own size: pictures of a world that stands still pack so well, and hardly anything else."""
-
-
-class Chunk(NamedTuple):
-    """Packed bytes, and how they are packed: "bz2", "lz4" or "zstd"."""
-
-    packing: str
-    data: bytes
+Chunk = tuple[str, bytes]
+"""How bytes are packed, "bz2", "lz4" or "zstd", and the bytes."""
 
 
 def check_bag_size(path: Path) -> None:
@@ -37,7 +32,7 @@ def check_messages_size(path: Path, reader: Any) -> None:
     folders = [one for one in inside if hasattr(one, "storages")]
     packed = [folder for folder in folders if folder.metadata.compression_mode == "message"]
     stores = [store for folder in packed for store in folder.storages]
-    _check(path, (Chunk("zstd", bytes(row[-1])) for store in stores for row in store.messages(store.connections)))
+    _check(path, (("zstd", bytes(row[-1])) for store in stores for row in store.messages(store.connections)))
 
 
 def _files(path: Path) -> list[Path]:
@@ -46,9 +41,9 @@ def _files(path: Path) -> list[Path]:
 
 def _check(path: Path, chunks: Iterable[Chunk]) -> None:
     most, size = max(allowed_bytes(BAG_MB), DENSEST * sum(file.stat().st_size for file in _files(path))), 0
-    for chunk in chunks:
+    for packing, data in chunks:
         with suppress(Exception):  # What is damaged fails in many ways, the libraries' own
-            size += unpacked_size(_decompressor(chunk.packing), chunk.data, most - size)
+            size += unpacked_size(_decompressor(packing), data, most - size)
         if size > most:
             check_unpacked(path, size, most / 1e6)
 
@@ -78,7 +73,7 @@ def _chunks(path: Path) -> Iterator[Chunk]:
             file.seek(8)
             yield from _of_mcap(file, path.stat().st_size)
         elif start.startswith(ZSTD):
-            yield Chunk("zstd", start + file.read())
+            yield "zstd", start + file.read()
 
 
 ZSTD = b"\x28\xb5\x2f\xfd"
@@ -95,7 +90,7 @@ def _of_ros1(file: IO[bytes], most: int) -> Iterator[Chunk]:
         (size,) = struct.unpack("<I", file.read(4))
         packing = fields.get(b"compression", b"none").decode()
         if fields.get(b"op") == b"\x05" and packing in ("bz2", "lz4"):
-            yield Chunk(packing, file.read(min(size, most)))
+            yield packing, file.read(min(size, most))
         else:
             file.seek(size, 1)
 
@@ -112,4 +107,4 @@ def _of_mcap(file: IO[bytes], most: int) -> Iterator[Chunk]:
         file.seek(8, 1)
         data = file.read(min(most, max(0, size - 40 - len(packing))))
         if packing in ("lz4", "zstd"):
-            yield Chunk(packing, data)
+            yield packing, data

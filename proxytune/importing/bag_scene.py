@@ -36,7 +36,6 @@ from proxytune.unpacking import open_picture
 TRANSFORMS = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
 WORLDS = ("map", "world", "odom")
 ROBOTS = ("base_link", "base_footprint")
-
 Row = tuple[int, int, tuple[float, ...]]
 """When a transform was stamped and received [ns], and its place and quaternion."""
 
@@ -167,7 +166,6 @@ def _remedy(transforms: dict[str, Transform]) -> str:
 
 
 Picture = NDArray[np.uint8]
-
 ENCODINGS: Mapping[str, tuple[int, tuple[int, int, int]]] = {
     "rgb8": (3, (0, 1, 2)),
     "bgr8": (3, (2, 1, 0)),

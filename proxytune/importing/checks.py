@@ -17,7 +17,6 @@ from proxytune.importing.source import Commands, Drive, Poses
 FASTEST_M_S = 40.0
 """No wheeled robot drives faster."""
 FASTEST_WHEEL_RAD_S = 2000.0
-
 SHORTEST_S = 1.0
 """A drive that takes less is one whose times are in another unit."""
 CHORD_S = 0.2
@@ -25,7 +24,6 @@ CHORD_S = 0.2
 APART = 50.0
 """Commanded and measured ways may differ by slip and gears, but not by such a factor."""
 MOVED_M = 0.1
-
 SPARSEST = 20.0
 """A drive that lasts this many times as long as its poses at their usual interval has stamps of another unit."""
 
@@ -40,10 +38,9 @@ def check_units(drive: Drive, where: str) -> None:
         raise LogError(f"{about}: {short}; state the unit of time (--columns time=t:ms)")
     usual = float(np.median(np.diff(times)))
     if lasts > SPARSEST * usual * len(times):
-        raise LogError(
-            f"{about}: takes {lasts:.4g} s with {len(times)} poses usually {usual:.3g} s apart; leave out wrong "
-            "stamps, cut it at its gaps, or state the unit of time (--columns time=t:ms)"
-        )
+        sparse = f"takes {lasts:.4g} s with {len(times)} poses usually {usual:.3g} s apart"
+        remedy = "leave out wrong stamps, cut it at its gaps, or state the unit of time (--columns time=t:ms)"
+        raise LogError(f"{about}: {sparse}; {remedy}")
     speed = _usual_speed(drive.poses)
     if speed > FASTEST_M_S:
         raise LogError(f"{about}: drives at {speed:.3g} m/s; state the units of x, y and time (--columns x=pos_x:mm)")
@@ -66,10 +63,8 @@ def _check_commands(commands: Commands, poses: Poses, about: str) -> None:
     x, y = (np.interp(grid, poses.times, column) for column in poses.places[:, :2].T)
     driven = float(np.hypot(np.diff(x), np.diff(y)).sum())
     if min(asked, driven) > MOVED_M / APART and max(asked, driven) > max(MOVED_M, APART * min(asked, driven)):
-        raise LogError(
-            f"{about}: the poses say that it drove {driven:.3g} m where its commands say {asked:.3g} m; state the "
-            "units of both (--columns x=pos_x:mm,v=cmd_lin:mm/s)"
-        )
+        apart = f"the poses say that it drove {driven:.3g} m where its commands say {asked:.3g} m"
+        raise LogError(f"{about}: {apart}; state the units of both (--columns x=pos_x:mm,v=cmd_lin:mm/s)")
 
 
 def _usual_speed(poses: Poses) -> float:
@@ -114,10 +109,8 @@ def complaint(quaternions: Floats, wrong: Flags, where: str) -> LogError:
     """The complaint about the first of those that are wrong."""
     number = int(np.argmax(wrong))
     values = ", ".join(f"{value:g}" for value in quaternions[number])
-    return LogError(
-        f"{where}: orientation {number + 1} is the quaternion ({values}), which is no rotation, and so are "
-        f"{wrong.sum()} of {len(wrong)}; record poses whose orientation is set"
-    )
+    others = f"which is no rotation, and so are {wrong.sum()} of {len(wrong)}; record poses whose orientation is set"
+    return LogError(f"{where}: orientation {number + 1} is the quaternion ({values}), {others}")
 
 
 FURTHEST_BACK_S = 0.5
@@ -137,15 +130,13 @@ def checked_drive(drive: Drive, where: str, offset_s: float = 0.0) -> tuple[Driv
     poses, notes = _ordered_poses(drive.poses, about)
     tilt, spans = math.degrees(float(np.median(poses.tilts))), np.ptp(poses.places, axis=0)
     if tilt > TILT_DEG:
-        raise LogError(
-            f"{about}: the robot's z axis lies {tilt:.0f}° from the world's for half of the drive; poses must be z-up "
-            "(x forward, y left): turn the rigid body or the world in the tracker, and export again"
-        )
+        lies = f"the robot's z axis lies {tilt:.0f}° from the world's for half of the drive"
+        remedy = "turn the rigid body or the world in the tracker, and export again"
+        raise LogError(f"{about}: {lies}; poses must be z-up (x forward, y left): {remedy}")
     if spans[2] > FLAT_M and spans[2] > spans[:2].min():
-        raise LogError(
-            f"{about}: z varies by {spans[2]:.2f} m, {'xy'[int(spans[:2].argmin())]} only by {spans[:2].min():.2f} m: "
-            "the world is not z-up; export poses with z upwards"
-        )
+        other = f"{'xy'[int(spans[:2].argmin())]} only by {spans[:2].min():.2f} m"
+        remedy = "the world is not z-up; export poses with z upwards"
+        raise LogError(f"{about}: z varies by {spans[2]:.2f} m, {other}: {remedy}")
     commands = drive.commands
     if commands is not None:
         _check_sizes((commands.times, commands.values), "commands", about)
@@ -156,21 +147,18 @@ def checked_drive(drive: Drive, where: str, offset_s: float = 0.0) -> tuple[Driv
         first, last = (float(end + offset_s) for end in commands.times[[0, -1]])
         begin, end = poses.times[0], poses.times[-1]
         if first >= end or last < begin:
-            raise LogError(
-                f"{about}: commands lie between {first:.3f} and {last:.3f} s, poses between {begin:.3f} and {end:.3f} "
-                "s: two clocks; use --stamps receive, or say how far apart they are by --clock-offset"
-            )
+            apart = f"commands lie between {first:.3f} and {last:.3f} s, poses between {begin:.3f} and {end:.3f} s"
+            remedy = "use --stamps receive, or say how far apart they are by --clock-offset"
+            raise LogError(f"{about}: {apart}: two clocks; {remedy}")
     return replace(drive, poses=poses, commands=commands), [f"drive {drive.name}: {note}" for note in notes]
 
 
 def _check_sizes(parts: tuple[Floats, ...], what: str, about: str) -> None:
     """Refuse numbers that are none of a robot: the square of their square would not be finite."""
-    for part in parts:
-        # NaN stands for what was not measured, and is told of elsewhere
-        large = np.abs(np.where(np.isnan(part), 0.0, part)) > LARGEST
-        if large.any():
-            value = float(part[large].flat[0])
-            raise LogError(f"{about}: its {what} hold the number {value:g}; leave out what was not measured")
+    values = np.concatenate([np.ravel(part) for part in parts])
+    large = values[np.abs(values) > LARGEST]  # NaN is none: what was not measured is told of elsewhere
+    if len(large):
+        raise LogError(f"{about}: its {what} hold the number {large[0]:g}; leave out what was not measured")
 
 
 LARGEST = 1e50
@@ -202,10 +190,8 @@ def _order(times: Floats, what: str, about: str, *, last: bool) -> tuple[np.ndar
     furthest = float(-steps.min(initial=0.0))
     if furthest > FURTHEST_BACK_S:
         number = int(np.argmin(steps)) + 1
-        raise LogError(
-            f"{about}: the stamps of its {what} go back by {furthest:.3g} s at number {number + 1}: a clock was set "
-            "anew; use --stamps receive, or cut the recording there"
-        )
+        back = f"the stamps of its {what} go back by {furthest:.3g} s at number {number + 1}"
+        raise LogError(f"{about}: {back}: a clock was set anew; use --stamps receive, or cut the recording there")
     order = np.argsort(times, kind="stable")
     sorted_times = times[order]
     repeats = np.diff(sorted_times) == 0.0

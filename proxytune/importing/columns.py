@@ -241,10 +241,8 @@ def column_values(table: Table, column: Column) -> Floats:
             remedy = f"if it is in percent, --columns throttle={column.name}:percent"
         elif column.field == "steering":
             remedy = f"if it is the wheels' angle, import a speed with it: --columns steering_angle={column.name}:deg"
-        raise LogError(
-            f"{table.path}: column '{column.name}' as {column.field} in {column.unit.name} ({column.known_by}): "
-            f"{problem}; {remedy}"
-        )
+        taken = f"column '{column.name}' as {column.field} in {column.unit.name} ({column.known_by})"
+        raise LogError(f"{table.path}: {taken}: {problem}; {remedy}")
     return values * column.unit.factor
 
 
@@ -252,10 +250,8 @@ def missing(table: Table, fields: Sequence[str]) -> LogError:
     """The complaint about fields that no column was found for."""
     car = {"throttle", "steering", "speed", "steering_angle"} & set(fields)
     example = EXAMPLE.replace("v=cmd_lin,omega=cmd_ang", "throttle=gas,steering=wheel") if car else EXAMPLE
-    return LogError(
-        f"{table.path}: no column found for {', '.join(fields)}; its columns are: {', '.join(table.names)}; "
-        f"say which is which, as in {example}"
-    )
+    lacking = f"no column found for {', '.join(fields)}; its columns are: {', '.join(table.names)}"
+    return LogError(f"{table.path}: {lacking}; say which is which, as in {example}")
 
 
 def with_commands(columns: Columns, kind: str, table: Table) -> tuple[Columns, str]:
@@ -361,10 +357,9 @@ def poses_by_drive(table: Table, columns: Columns, *, gaps: bool = False) -> dic
     for column in (columns[axis] for axis in ("x", "y") if columns[axis].known_by == "by its name"):
         # Metres in columns whose names end in mm or cm: the robot would hardly have moved
         if column.unit.factor < 1.0 and 0.0 < extent < LEAST_EXTENT_M:
-            raise LogError(
-                f"{table.path}: column '{column.name}' in {column.unit.name}, as its name ends: the robot moved "
-                f"{extent * 1e3:.2g} mm in all; state its unit, as in --columns {column.field}={column.name}:m"
-            )
+            taken = f"column '{column.name}' in {column.unit.name}, as its name ends"
+            remedy = f"state its unit, as in --columns {column.field}={column.name}:m"
+            raise LogError(f"{table.path}: {taken}: the robot moved {extent * 1e3:.2g} mm in all; {remedy}")
     headings, tilts = by_field.get("heading"), np.zeros(len(times))
     if headings is None:
         headings, tilts = headings_and_tilts(values[:, -4:], str(table.path))

@@ -18,7 +18,7 @@ from proxytune.arrays import Floats
 from proxytune.errors import InputError, LogError, RunError
 from proxytune.files import folder_draft_of, temporary_folder
 from proxytune.importing.arrays import is_arrays, read_arrays
-from proxytune.importing.bag import is_bag
+from proxytune.importing.bag import bags_in
 from proxytune.importing.checks import check_units, checked_drive, lag_of
 from proxytune.importing.source import Drive, Facts, Pictures, Source, Survey, Wanted
 from proxytune.importing.tables import is_csv_tables, is_mrclam, is_tum, read_csv_tables, read_mrclam, read_tum
@@ -57,17 +57,14 @@ def clock_notes(drives: Sequence[Survey]) -> list[str]:
     early = [pair for pair in lags if pair[0] < 0.0]
     if early:
         lag, first = min(early)
-        return [
-            f"{len(early)} of {len(drives)} drives turn before they are told to (up to {-lag:.2f} s, {first}): two "
-            "clocks stamped commands and poses; diagnose corrects that, --clock-offset declares it"
-        ]
+        turn = f"{len(early)} of {len(drives)} drives turn before they are told to (up to {-lag:.2f} s, {first})"
+        remedy = "diagnose corrects that, --clock-offset declares it"
+        return [f"{turn}: two clocks stamped commands and poses; {remedy}"]
     if not lags:
         return ["no drive turns enough to tell whether commands and poses share a clock"]
     usual = float(np.median([lag for lag, _ in lags]))
-    return [
-        f"it turns {usual:.2f} s after its commands: delay, lag and an offset between the two clocks together, which "
-        "nothing here can tell apart"
-    ]
+    together = "delay, lag and an offset between the two clocks together, which nothing here can tell apart"
+    return [f"it turns {usual:.2f} s after its commands: {together}"]
 
 
 def rows_notes(drives: Sequence[Drive]) -> list[str]:
@@ -87,8 +84,8 @@ def rows_notes(drives: Sequence[Drive]) -> list[str]:
     ]
 
 
-FORMS: Mapping[Callable[[Path], bool], Callable[[Path, Wanted], Source]] = {
-    is_bag: read_bag,
+FORMS: Mapping[Callable[[Path], object], Callable[[Path, Wanted], Source]] = {
+    bags_in: read_bag,
     is_arrays: read_arrays,
     is_mrclam: read_mrclam,
     is_tum: read_tum,

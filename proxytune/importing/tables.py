@@ -40,8 +40,6 @@ from proxytune.settings import nearest
 
 STEMS = ("commands", "cmd_vel", "cmd")
 COMMAND_SUFFIXES = (".csv", ".tsv", ".txt")
-
-
 CommandsOf = Mapping[str, Commands]
 """The commands of a file by the drive that it names, or "" where it names none."""
 
@@ -104,10 +102,8 @@ def _by_time(path: Path, commands: Commands, drives: Sequence[Drive]) -> list[Dr
     """Cut commands where drives begin and end; the one in force at a beginning belongs to the drive."""
     spans = sorted((drive.poses.times.min(), drive.poses.times.max()) for drive in drives)
     if any(end >= begin for (_, end), (begin, _) in itertools.pairwise(spans)):
-        raise LogError(
-            f"{path}: names no drives, and the drives overlap in time, so that commands cannot be shared out; "
-            "add a column 'episode', or give each drive a file of commands"
-        )
+        overlap = "names no drives, and the drives overlap in time, so that commands cannot be shared out"
+        raise LogError(f"{path}: {overlap}; add a column 'episode', or give each drive a file of commands")
     shared = []
     for drive in drives:
         begin, end = drive.poses.times.min(), drive.poses.times.max()
@@ -116,10 +112,8 @@ def _by_time(path: Path, commands: Commands, drives: Sequence[Drive]) -> list[Dr
         if len(before):
             during[before[np.argmax(commands.times[before])]] = True
         if not during.any():
-            raise LogError(
-                f"{path}: has no command while '{drive.name}' was driven, {begin:.12g} to {end:.12g} s; "
-                "check that both files have stamps of one clock"
-            )
+            none = f"has no command while '{drive.name}' was driven, {begin:.12g} to {end:.12g} s"
+            raise LogError(f"{path}: {none}; check that both files have stamps of one clock")
         own = replace(commands, times=commands.times[during], values=commands.values[during])
         shared.append(replace(drive, commands=own))
     return shared
@@ -217,17 +211,14 @@ def _columns(table: Table, wanted: Wanted, apart: Path | None) -> tuple[Columns,
     columns = choose_columns(table, stated, fields)
     found = set(COMMAND_FIELDS) & set(columns) - {ENABLED}
     if not found and "command_time" in wanted.columns:
-        raise LogError(
-            f"{table.path}: command_time is the clock of commands in the same table, which has none; leave it out"
-        )
+        none = "command_time is the clock of commands in the same table, which has none"
+        raise LogError(f"{table.path}: {none}; leave it out")
     if not own or (apart and not found):
         return {field: column for field, column in columns.items() if field not in COMMAND_FIELDS}, "none"
     if not found:
         pose_fields(table, columns)
-        raise LogError(
-            f"{table.path}: no column of commands found; its columns are: {', '.join(table.names)}; say which they are "
-            f"({EXAMPLE}), name their file (--commands FILE), or leave them out (--commands none)"
-        )
+        none = f"no column of commands found; its columns are: {', '.join(table.names)}; say which they are ({EXAMPLE})"
+        raise LogError(f"{table.path}: {none}, name their file (--commands FILE), or leave them out (--commands none)")
     return with_commands(columns, wanted.kind, table)
 
 
@@ -250,8 +241,6 @@ def read_mrclam(path: Path, wanted: Wanted) -> Source:
     folder, robot = (path.parent, match[1]) if match and not path.is_dir() else (path, wanted.poses)
     if folder == path:
         robots = _robots(folder)
-        if not robots:
-            raise LogError(f"{path}: has no file such as Robot1_Groundtruth.dat; give a folder of the MRCLAM data set")
         if robot and robot not in robots:
             raise LogError(f"{path}: has no robot '{robot}'; {nearest(robot, robots)}")
         if not robot and len(robots) > 1:
@@ -313,10 +302,9 @@ def _read_one(path: Path, wanted: Wanted) -> Source:
         return source
     file = find_commands(path, wanted)
     if file is None:
-        raise LogError(
-            f"{path}: a TUM file holds no commands; lay {path.stem}_commands.csv (time, v, omega) beside it, name "
-            "another file with --commands FILE, or write --commands none for a log without them"
-        )
+        lay = f"lay {path.stem}_commands.csv (time, v, omega) beside it, name another file with --commands FILE"
+        none = "or write --commands none for a log without them"
+        raise LogError(f"{path}: a TUM file holds no commands; {lay}, {none}")
     commands, channels, note = read_commands(file, wanted)
     return replace(
         source,

@@ -96,10 +96,8 @@ def read_text_table(path: Path, names: Sequence[str] = ()) -> Table:
     for number, line in lines:
         row = _cells(path, number, line, separator)
         if len(row) != len(names):
-            raise LogError(
-                f"{path}: line {number}: has {len(row)} cells, but there are {len(names)} columns: "
-                f"{', '.join(names)}; correct that line"
-            )
+            counts = f"has {len(row)} cells, but there are {len(names)} columns: {', '.join(names)}"
+            raise LogError(f"{path}: line {number}: {counts}; correct that line")
         rows.append(row)
     table = pd.DataFrame(rows, columns=list(names), index=[number for number, _ in lines], dtype=str)
     return Table(path, table)
@@ -176,7 +174,6 @@ PLACE = ("x", "y", "z")
 QUATERNION = ("qx", "qy", "qz", "qw")
 POSE = (*PLACE, "heading", *QUATERNION)
 COMMAND_FIELDS = (*(field for pair in COMMANDS.values() for field in pair), ENABLED)
-
 EXAMPLE = "--columns time=stamp_ns:ns,x=pos_x_mm:mm,y=pos_y_mm:mm,heading=yaw_deg:deg,v=cmd_lin,omega=cmd_ang"
 """A column map, for complaints."""
 FIELDS = package_table("importing/fields.toml")

@@ -146,10 +146,8 @@ def _choose(role: Role, topics: tuple[Topic, ...], name: str, where: str) -> Top
 def _kind_of(topic: Topic, wanted: str, where: str) -> str:
     said = KIND_OF[short(topic.kind)]
     if not said and not wanted:
-        raise LogError(
-            f"{where}: topic {topic.name} does not say what its two numbers are; add --kind duty, "
-            "wheel_speed or twist, or leave commands out by --commands none"
-        )
+        remedy = "add --kind duty, wheel_speed or twist, or leave commands out by --commands none"
+        raise LogError(f"{where}: topic {topic.name} does not say what its two numbers are; {remedy}")
     if said and wanted and said != wanted:
         raise LogError(f"{where}: topic {topic.name} holds commands of kind {said}, not {wanted}; leave --kind out")
     return said or wanted

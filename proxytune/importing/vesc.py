@@ -17,7 +17,6 @@ from proxytune.importing.source import Commands, finite
 KIND = "std_msgs/msg/Float64 of a VESC"
 """What the type of a motor's topic is called where its servo's stands beside it."""
 MOTOR, SERVO = "commands/motor/speed", "commands/servo/position"
-
 TOGETHER_S = 0.002
 """Two messages that come within this time are one command."""
 GAINS = tuple(f"{of}_{part}" for of in ("speed_to_erpm", "steering_angle_to_servo") for part in ("gain", "offset"))
@@ -60,10 +59,9 @@ def read_vesc(bag: Bag, motor: str, gains: Path | None) -> tuple[Commands, tuple
     union = union[np.diff(union, append=np.inf) > TOGETHER_S]
     erpm, servo = (of[np.searchsorted(at, union, side="right") - 1] for at, of in zip(times, held, strict=True))
     columns = ((erpm - speed_offset) / speed_gain, (servo - servo_offset) / servo_gain)
-    note = (
-        f"{servo_of(motor)} is the steering; speed is (erpm {-speed_offset:+g}) / {speed_gain:g}, the wheels' angle "
-        f"(servo {-servo_offset:+g}) / {servo_gain:g}, by {gains}; times are when the bag received each message."
-    )
+    speed = f"speed is (erpm {-speed_offset:+g}) / {speed_gain:g}"
+    angle = f"the wheels' angle (servo {-servo_offset:+g}) / {servo_gain:g}, by {gains}"
+    note = f"{servo_of(motor)} is the steering; {speed}, {angle}; times are when the bag received each message."
     return Commands("speed_steering", union, np.column_stack(columns)), (note,)
 
 

@@ -101,7 +101,7 @@ def _chords(episode: LogEpisode) -> Chords:
 
 def _axes(drives: list[Chords]) -> Iterator[str]:
     """Tell where the robot moves in a mirror: x or y reversed, or exchanged, and headings not."""
-    speed, course, heading = (np.concatenate([getattr(one, name) for one in drives]) for name in CHORD_PARTS)
+    _, course, heading, speed, _ = (np.concatenate(parts) for parts in zip(*drives, strict=True))
     if len(speed) < ENOUGH:
         return
     moves = speed >= max(MOVES * float(np.quantile(speed, 0.9)), 1e-9)
@@ -111,16 +111,12 @@ def _axes(drives: list[Chords]) -> Iterator[str]:
         float(np.abs(np.mean(np.exp(2j * angle)))) for angle in (course - heading, course + heading, heading)
     )
     if spread < TURNED and together < MISFITS and mirrored > FITS:
-        yield (
-            "places are mirrored against headings: the robot moves where a mirror image of it points; reverse x or y, "
-            "or exchange them, so that headings turn from x to y"
-        )
+        remedy = "reverse x or y, or exchange them, so that headings turn from x to y"
+        yield f"places are mirrored against headings: the robot moves where a mirror image of it points; {remedy}"
     askew = math.degrees(float(np.angle(np.mean(np.exp(2j * (course - heading)))))) / 2.0
     if spread < TURNED and together > FITS and abs(askew) > ASKEW_DEG:
-        yield (
-            f"the robot moves at {abs(askew):.0f}° to where its headings point: headings grow from x to y and are 0 "
-            "along x; turn them, or the places"
-        )
+        remedy = "headings grow from x to y and are 0 along x; turn them, or the places"
+        yield f"the robot moves at {abs(askew):.0f}° to where its headings point: {remedy}"
 
 
 def _jumps(log: Log, drives: list[Chords]) -> Iterator[str]:
@@ -129,11 +125,9 @@ def _jumps(log: Log, drives: list[Chords]) -> Iterator[str]:
         usual = float(np.quantile(chords.speed, 0.9)) if len(chords.speed) >= ENOUGH else np.inf
         if chords.speed.max(initial=0.0) * CHORD_S > max(JUMP_M, JUMP * usual * CHORD_S):
             at = int(np.argmax(chords.speed))
-            yield (
-                f"drive '{episode.name}' jumps by {chords.speed[at] * CHORD_S:.2g} m "
-                f"after {chords.times[at] - chords.times[0]:.4g} s: "
-                "the tracker took something else for it, or two drives are one; cut there"
-            )
+            jump, after = chords.speed[at] * CHORD_S, chords.times[at] - chords.times[0]
+            why = "the tracker took something else for it, or two drives are one; cut there"
+            yield f"drive '{episode.name}' jumps by {jump:.2g} m after {after:.4g} s: {why}"
             return
 
 
@@ -175,15 +169,10 @@ def _frozen(log: Log, asked: Sequence[tuple[Floats, Floats]]) -> Iterator[str]:
         for first, end in zip(changes, ends, strict=True):
             lasts = float(times[end - 1] - times[first])
             if lasts > FROZEN_S and driving[first:end].mean() * lasts > FROZEN_S:
-                yield (
-                    f"drive '{episode.name}' keeps one pose to the last digit for {lasts:.2g} s, "
-                    f"from {times[first] - times[0]:.4g} s on, while its commands go on: "
-                    "a tracker that lost the robot; cut it there"
-                )
+                keeps = f"keeps one pose to the last digit for {lasts:.2g} s, from {times[first] - times[0]:.4g} s on"
+                why = "while its commands go on: a tracker that lost the robot; cut it there"
+                yield f"drive '{episode.name}' {keeps}, {why}"
                 return
-
-
-CHORD_PARTS = ("speed", "course", "heading")
 
 
 def _commanded(log: Log, figures: Figures) -> list[tuple[Floats, Floats]]:
@@ -205,18 +194,14 @@ def _turning(log: Log, drives: list[Chords]) -> Iterator[str]:
     if strongest > AGAINST and log.command == "twist" and not SLOWEST_TURN < gain < FASTEST_TURN:
         yield f"the robot turns {gain:.2g} times as fast as its commands say: check the unit of omega, rad/s"
     if strongest < -AGAINST:
-        yield (
-            f"the robot turns the other way than its commands say (correlation {strongest:.2f}): headings that grow "
-            "clockwise, a mirrored axis, or left and right exchanged"
-        )
+        why = "headings that grow clockwise, a mirrored axis, or left and right exchanged"
+        yield f"the robot turns the other way than its commands say (correlation {strongest:.2f}): {why}"
     if log.command in ("twist", *CAR_COMMANDS):
         driving, turning = COMMANDS[log.command]
         other, _ = _correlation(log, drives, [episode.held[:, 0] for episode in log.episodes])
         if abs(other) > EXCHANGED and abs(strongest) < AGAINST:
-            yield (
-                f"the robot turns with {driving} (correlation {other:.2f}) and not with {turning} ({strongest:.2f}): "
-                "are the two exchanged?"
-            )
+            both = f"{driving} (correlation {other:.2f}) and not with {turning} ({strongest:.2f})"
+            yield f"the robot turns with {both}: are the two exchanged?"
 
 
 def _correlation(log: Log, drives: list[Chords], turns: Sequence[Floats]) -> tuple[float, float]:

@@ -25,11 +25,8 @@ KEYS = ("frames", "poses", "exposure", "rectified", "shutter", "readout_s")
 LISTED = "frames.csv"
 PATTERN = re.compile(r"[^%]*%(0[1-9])?d[^%]*\.(png|jpe?g)", re.IGNORECASE)
 PLAIN_NAME = re.compile(r"\w[\w-]*")
-
 MOST_FRAMES = 2**53
 """Whole numbers up to here are exact as read."""
-
-
 StatedCamera = tuple[str, bool, Frames]
 """The camera of log.toml: where its pictures lie, as "frames/%06d.png", whether [camera] says so, and no frames yet.
 
@@ -153,16 +150,12 @@ def _read_instants(path: Path, samples: Rows, episodes: Sequence[LogEpisode]) ->
     if not within.any():
         name, begin, end = samples.names[drives[0]], begins[0], ends[0]
         poses = f"its poses between {begin:.12g} and {end:.12g} s" if np.isfinite(begin) else "it has no pose"
-        problem = (
-            f"no frame lies within its episode's poses: the first of '{name}' is at {times[0]:.12g} s, {poses}; "
-            "write both in seconds of one clock"
-        )
-        raise rows.error(0, "time", problem)
+        problem = f"no frame lies within its episode's poses: the first of '{name}' is at {times[0]:.12g} s, {poses}"
+        raise rows.error(0, "time", f"{problem}; write both in seconds of one clock")
     return numbers.astype(np.int64)[within], drives[within], times[within]
 
 
 Pictures = NDArray[np.uint8]
-
 BROKEN = (OSError, SyntaxError, ValueError, EOFError, struct.error, zlib.error, Image.DecompressionBombError)
 """What Pillow raises at files that are cut off or damaged."""
 

@@ -70,7 +70,5 @@ def outliers_note(log: Log) -> Iterator[str]:
     if count := sum(wrong.values()):
         most = max(wrong, key=lambda name: wrong[name])
         lies = "pose lies" if count == 1 else "poses lie"
-        yield (
-            f"{count} {lies} off the way for a sample or two (most in drive '{most}', {wrong[most]}): the tracker "
-            "took something else for the robot; left out"
-        )
+        off = f"{count} {lies} off the way for a sample or two (most in drive '{most}', {wrong[most]})"
+        yield f"{off}: the tracker took something else for the robot; left out"

@@ -3,7 +3,6 @@
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from types import MappingProxyType
 from typing import TypeVar
 
 import numpy as np
@@ -18,7 +17,6 @@ from proxytune.settings import GEOMETRY, Section, read_settings
 
 TEXTS = ("name", "robot", "pose", "source", "licence", "map", "frames")
 KEYS = ("format", *TEXTS, "command", "rate_hz", "clock_offset_s", "measured", "camera", *GEOMETRY)
-
 FIT = "fit"
 """What `clock_offset_s` says where the offset is to be fitted."""
 FURTHEST_S = 3600.0
@@ -174,32 +172,22 @@ def _check_overlap(samples: Rows, rows: Rows, issued: Mapping[str, Issued], offs
     lasts = np.append(samples.firsts[1:], len(samples.lines)) - 1
     for name, first, last in zip(samples.names, samples.firsts, lasts, strict=True):
         if name not in issued:
-            raise samples.error(
-                int(first), "episode", f"'{name}' is not in commands.csv; add its commands, or leave it out"
-            )
+            problem = f"'{name}' is not in commands.csv; add its commands, or leave it out"
+            raise samples.error(int(first), "episode", problem)
         begin, end = samples.values["time"][[first, last]]
         own = issued[name][0] + offset_s
         if own[0] >= end or own[-1] < begin:
             row = int(rows.firsts[rows.names.index(name)])
-            problem = (
-                f"the commands of '{name}' lie between {own[0]:.12g} and {own[-1]:.12g} s, its poses between "
-                f"{begin:.12g} and {end:.12g} s; write both in seconds of one clock"
-            )
-            raise rows.error(row, "time", problem)
+            lie = f"lie between {own[0]:.12g} and {own[-1]:.12g} s, its poses between {begin:.12g} and {end:.12g} s"
+            raise rows.error(row, "time", f"the commands of '{name}' {lie}; write both in seconds of one clock")
 
 
-SIZES: Mapping[str, tuple[str, float, str]] = MappingProxyType(
-    {
-        **dict.fromkeys(COMMANDS["duty"], ("a duty must be", 1.0, "divide by full duty")),
-        "throttle": (
-            "throttle must be",
-            1.0,
-            "divide a percentage by 100, and a pulse's distance from rest by its range",
-        ),
-        "steering": ("steering must be", 1.0, "divide degrees by the greatest wheel angle, pulses by their range"),
-        "steering_angle": ("a wheel angle must be", np.pi / 2.0, "turn degrees into radians"),
-    }
-)
+SIZES: Mapping[str, tuple[str, float, str]] = {
+    **dict.fromkeys(COMMANDS["duty"], ("a duty must be", 1.0, "divide by full duty")),
+    "throttle": ("throttle must be", 1.0, "divide a percentage by 100, and a pulse's distance from rest by its range"),
+    "steering": ("steering must be", 1.0, "divide degrees by the greatest wheel angle, pulses by their range"),
+    "steering_angle": ("a wheel angle must be", np.pi / 2.0, "turn degrees into radians"),
+}
 """How a command is called in a complaint, the largest, and what to do about a larger one."""
 
 

@@ -100,7 +100,6 @@ def repeats_note(log: Log) -> Iterator[str]:
     share = _share(every, _least_speed(every))
     if share >= USUAL:
         fresh = sum(len(runs.counts) for runs in every) / sum(len(runs.known) for runs in every)
-        yield (
-            f"{100.0 * share:.0f} % of the poses repeat the one before to the last digit while the robot moves "
-            f"(about {fresh * log.poses_hz:.2g} a second are measured): each is used once, where it first comes"
-        )
+        repeat = f"{100.0 * share:.0f} % of the poses repeat the one before to the last digit while the robot moves"
+        measured = f"about {fresh * log.poses_hz:.2g} a second are measured"
+        yield f"{repeat} ({measured}): each is used once, where it first comes"

@@ -80,9 +80,7 @@ class Rows:
     @property
     def episode(self) -> Whole:
         """Episode of each row (N,)."""
-        begins = np.zeros(len(self.lines), dtype=np.int64)
-        begins[self.firsts[1:]] = 1
-        return np.cumsum(begins)
+        return np.repeat(np.arange(len(self.firsts)), np.diff(self.firsts, append=len(self.lines)))
 
     @property
     def follows(self) -> Flags:

@@ -42,18 +42,15 @@ def _check_grid(samples: Rows, elapsed: Floats, rate_hz: float) -> None:
     sparse = np.append(np.diff(elapsed) * samples.follows, 0.0)
     longest = int(np.argmax(sparse))
     if sparse.sum() > SPARSEST * len(elapsed):
-        problem = (
-            f"the rows cover {sparse.sum():.0f} samples of {rate_hz:g} Hz with {len(elapsed)} rows, with a gap of "
-            f"{sparse[longest] / rate_hz:g} s before this one; write seconds, correct rate_hz or split the episode"
-        )
-        raise samples.error(longest + 1, "time", problem)
+        cover = f"the rows cover {sparse.sum():.0f} samples of {rate_hz:g} Hz with {len(elapsed)} rows"
+        gap = f"with a gap of {sparse[longest] / rate_hz:g} s before this one"
+        remedy = "write seconds, correct rate_hz or split the episode"
+        raise samples.error(longest + 1, "time", f"{cover}, {gap}; {remedy}")
     if off.any():
         row = int(np.argmax(off))
-        problem = (
-            f"{samples.values['time'][row]:.12g} s lies off the grid of {rate_hz:g} Hz from the episode's first row; "
-            "correct rate_hz, or leave it out of log.toml: poses then keep times of their own"
-        )
-        raise samples.error(row, "time", problem)
+        lies = f"{samples.values['time'][row]:.12g} s lies off the grid of {rate_hz:g} Hz from the episode's first row"
+        remedy = "correct rate_hz, or leave it out of log.toml: poses then keep times of their own"
+        raise samples.error(row, "time", f"{lies}; {remedy}")
 
 
 def spread(values: Floats, places: Whole, length: int) -> Floats:
@@ -200,9 +197,7 @@ def on_own_grid(times: Floats, poses: Floats, rate_hz: float) -> tuple[Floats, F
     length = int(max(np.rint(steps[-1]), rows.max(initial=0))) + 1
     grid = times[0] + np.arange(length) / rate_hz
     measured = Measured(times[known], poses[known], rows)
-    on_grid = np.full((length, 3), np.nan)
-    on_grid[rows] = moved(measured, grid[rows])
-    return grid, on_grid, measured
+    return grid, spread(moved(measured, grid[rows]), rows, length), measured
 
 
 def _check_density(samples: Rows, usual: float) -> None:
@@ -211,11 +206,9 @@ def _check_density(samples: Rows, usual: float) -> None:
     gaps = np.append(np.diff(times) * samples.follows, 0.0)
     if gaps.sum() * usual > SPARSEST * len(times):
         longest = int(np.argmax(gaps))
-        problem = (
-            f"the rows cover {gaps.sum():.0f} s with {len(times)} rows, usually {1.0 / usual:.3g} s apart, with a gap "
-            f"of {gaps[longest]:g} s before this one; write seconds, or split the episode at its gaps"
-        )
-        raise samples.error(longest + 1, "time", problem)
+        cover = f"the rows cover {gaps.sum():.0f} s with {len(times)} rows, usually {1.0 / usual:.3g} s apart"
+        gap = f"with a gap of {gaps[longest]:g} s before this one"
+        raise samples.error(longest + 1, "time", f"{cover}, {gap}; write seconds, or split the episode at its gaps")
 
 
 def moved(measured: Measured, times: Floats) -> Floats:

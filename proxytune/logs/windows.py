@@ -34,12 +34,10 @@ def join_windows(log: Log) -> Log:
 def windows_note(log: Log) -> Iterator[str]:
     """Tell of windows that are joined, a sentence at most."""
     groups = _groups(log)
-    if len(groups) < len(log.episodes):
+    if len(groups) < (count := len(log.episodes)):
         drives = "one drive" if len(groups) == 1 else f"{len(groups)} drives"
-        yield (
-            f"{len(log.episodes) - len(groups)} of its {len(log.episodes)} drives go on a sample after the one before, "
-            f"where that ended: they are windows of {drives}, and are diagnosed as such"
-        )
+        joined = f"{count - len(groups)} of its {count} drives go on a sample after the one before"
+        yield f"{joined}, where that ended: they are windows of {drives}, and are diagnosed as such"
 
 
 def _groups(log: Log) -> list[tuple[LogEpisode, ...]]:

@@ -36,7 +36,7 @@ from .export.instance import (
 from .export.into import patch as patch
 from .export.mjcf import mjcf_text as mjcf_text
 from .export.ros import node_text as node_text, ros_text as ros_text
-from .export.urdf import urdf_text as urdf_text
+from .export.urdf import end_of as end_of, urdf_text as urdf_text
 from .families import (
     families_document as families_document,
     families_figure as families_figure,

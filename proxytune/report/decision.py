@@ -95,10 +95,8 @@ def decision_table(assessment: Assessment, target: str) -> Table:
     if decision.without:
         right = sum(panel.agrees is True for panel in decision.without)
         alone = sum(panel.agrees is True for panel in decision.tasks)
-        notes.append(
-            f"the proxy's winner is the target's in {alone} of {len(decision.tasks)} tasks alone, "
-            f"and in {right} of {len(decision.without)} cases with one task left out"
-        )
+        cases = f"in {right} of {len(decision.without)} cases with one task left out"
+        notes.append(f"the proxy's winner is the target's in {alone} of {len(decision.tasks)} tasks alone, and {cases}")
     title = f"Which agent to deploy on {target}, chosen on {decision.chosen_on}"
     return Table(title, columns_of(("agent",), heads), tuple(rows), tuple(notes))
 

@@ -76,6 +76,16 @@ def dress(axes: Axes, across: str = "", up: str = "") -> None:
         axes.set_ylabel(up, fontsize=8)
 
 
+def label_sides(panels: NDArray[Any], across: str, up: str) -> None:
+    """Small ticks in a grid of panels (rows, columns), and once along each of its sides what its axes are."""
+    for axes in panels.flat:
+        axes.tick_params(labelsize=7)
+    for axes in panels[-1]:
+        axes.set_xlabel(across, fontsize=8)
+    for axes in panels[:, 0]:
+        axes.set_ylabel(up, fontsize=8)
+
+
 def mark_truth(axes: Axes, value: float) -> None:
     """A triangle at the top at the value of the θ that made the target."""
     (mark,) = axes.plot(value, 1.0, "v", color="black", transform=axes.get_xaxis_transform(), label="truth")

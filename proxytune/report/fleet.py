@@ -91,14 +91,10 @@ def fleet_view(fleet: Fleet, figure: Drawn) -> View:
     if not lines:
         following = "Find what the proxy lacks: `python -m proxytune diagnose`."
         return View(title, fleet_sentence(fleet), following, (*tables, picture))
-    use = Paragraphs(
-        "To use p(θ)",
-        (
-            "To teach over the fleet, write into the study.toml of `teach`, below `[teaching.proxies.fleet]`: "
-            + ", ".join(f"`{line}`" for line in lines),
-            "The same lines below `[parameters]` are the box for the next robot of this kind.",
-        ),
-    )
+    below, pasted = "below `[teaching.proxies.fleet]`", ", ".join(f"`{line}`" for line in lines)
+    teach = f"To teach over the fleet, write into the study.toml of `teach`, {below}: {pasted}"
+    box = "The same lines below `[parameters]` are the box for the next robot of this kind."
+    use = Paragraphs("To use p(θ)", (teach, box))
     following = "Randomise over 95 % of robots, or search the next one there: the lines are below."
     return View(title, fleet_sentence(fleet), following, (tables[0], picture, use, *tables[1:]))
 

@@ -3,13 +3,13 @@
 import base64
 import html
 import re
-import tomllib
 from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from PIL import Image
 
+from proxytune.files import package_table
 from proxytune.report.view import Column, Foot, Paragraphs, Part, Picture, Table, View, foot_of
 from proxytune.report.writing import fill, svg_of, write_text
 
@@ -26,7 +26,7 @@ ABOUT = ("robot", "log", "target", "targets")
 """Settings that stand at the top of a page too."""
 PROSE = 28
 """A cell of more characters than this is wrapped, and kept wide enough to be read."""
-WORDS: dict[str, str] = tomllib.loads(fill("words.toml"))
+WORDS: dict[str, str] = package_table("report/templates/words.toml")
 """What a page explains at its foot of the words that it uses."""
 STYLE = fill("page.css")
 

@@ -4,7 +4,6 @@ What an effect does is the first clause of its docstring, a user's own effect's 
 """
 
 import inspect
-import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict
 from typing import Any
@@ -12,16 +11,15 @@ from typing import Any
 from proxytune.diagnosis import Estimate
 from proxytune.effects import SHIPPED, Catalogue
 from proxytune.errors import ExtensionError
+from proxytune.files import package_table
 from proxytune.report.wording import digits, fixed, listed, plain, short, span
-from proxytune.report.writing import fill
 
 SHARED_OUT = "the right wheel has {} more of it than both have on average, the left one as much less"
 UNEVEN = ("dead_band", "stiction", "saturation", "motor_lag", "backlash")
-CLAUSES: Mapping[str, str] = tomllib.loads(fill("clauses.toml")) | {
+CLAUSES: Mapping[str, str] = package_table("report/templates/clauses.toml") | {
     f"{effect}.imbalance": SHARED_OUT for effect in UNEVEN
 }
 """By name in θ: what a value says; {} stands for the value with its unit and interval."""
-
 WORSE = 2.0
 """From here on an error without an effect is told as so many times the one with it."""
 MOST_FITTED = 4

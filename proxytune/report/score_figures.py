@@ -26,11 +26,7 @@ FLIP_COLOURS = {"same": style.LIGHT_GREY, "lost": style.BLUE, "invented": style.
 
 
 def scatter_figure(assessment: Assessment) -> Figure:
-    """Draw each agent's mean score in the proxy against that on the target, one panel per metric.
-
-    Names stand on the right, highest score in the proxy on top. Error bars are standard errors over episodes; on the
-    dashed line, proxy and target agree.
-    """
+    """Draw each agent's mean score in the proxy against that on the target, one panel per metric."""
     metrics, agents = assessment.inputs.metrics, assessment.inputs.agents
     height = max(PANEL, LINE * min(MOST, len(agents)) + 0.6)
     figure, panels = style.grid_of(height * len(metrics), len(metrics), 1)

@@ -273,12 +273,7 @@ HEIGHT, BELOW = 1.2, 0.4
 
 
 def sweep_figure(curves: Sequence[SweepCurve], truth: Theta | None = None) -> Figure:
-    """Draw PRPV beside PPV, one row per parameter, bootstrap intervals as bands; lower is better in both.
-
-    A dashed green line with its band is the noise floor, or the target's halves where there is no better, a dotted one
-    chance. The dashed vertical line is where the parameter itself is held when others are swept, the triangle the θ
-    that made the target, where that is known.
-    """
+    """Draw PRPV beside PPV, one row per parameter, bootstrap intervals as bands; lower is better in both."""
     figure, panels = style.grid_of(HEIGHT * len(curves) + BELOW, len(curves), 2, sharey="col")
     for curve, row in zip(curves, panels, strict=True):
         draw_prpv_and_ppv(row[0], row[1], curve)
@@ -294,11 +289,7 @@ def sweep_figure(curves: Sequence[SweepCurve], truth: Theta | None = None) -> Fi
 
 
 def panels_figure(curve: SweepCurve, truth: Theta | None = None) -> Figure:
-    """Draw PRPV, PPV, SRCC and, where it was asked for, POD along one parameter, as the paper's figure does.
-
-    Bands are 95 % bootstrap intervals; the dashed vertical line is where the parameter is held when others are swept,
-    the triangle the θ that made the target, where that is known.
-    """
+    """Draw PRPV, PPV, SRCC and, where it was asked for, POD along one parameter, as the paper's figure does."""
     series, rows = series_of(curve), 3 if curve.has_pod else 2
     figure, panels = style.grid_of(HEIGHT * rows + BELOW, rows, 2)
     prpv, ppv, srcc, key, *pod = panels.flat
@@ -335,11 +326,7 @@ CHARACTERS = 50
 
 
 def bars_figure(curves: Sequence[SweepCurve]) -> Figure:
-    """Draw PRPV at three values of each parameter, its bootstrap interval, and the noise floor by its kind.
-
-    The values are where the parameter is held, and the grid points nearest to a third of its range below and above;
-    the held one is darker.
-    """
+    """Draw PRPV at the `bar_points` of each parameter with its bootstrap interval, and the noise floor by its kind."""
     figure, axes = style.one_panel(2.9)
     ticks: list[tuple[float, str]] = []
     for place, curve in enumerate(curves):

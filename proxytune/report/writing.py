@@ -3,7 +3,6 @@
 import contextlib
 import html
 import re
-import tomllib
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextvars import ContextVar
@@ -24,15 +23,15 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from proxytune.errors import RunError
-from proxytune.files import draft_of, fill_template
+from proxytune.files import draft_of, fill_template, package_table
 from proxytune.report.view import Drawn, Picture
 
 UNDATED: dict[str, dict[str, Any]] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
 """Metadata left out of files, so that the same figure gives the same bytes."""
 fill = partial(fill_template, "report")
-CAPTIONS: Mapping[str, Mapping[str, Mapping[str, str]]] = tomllib.loads(fill("captions.toml"))
+CAPTIONS: Mapping[str, Mapping[str, Mapping[str, str]]] = package_table("report/templates/captions.toml")
 """Title and caption of each figure, by its subject."""
-ABOUT: Mapping[str, str] = tomllib.loads(fill("about.toml"))
+ABOUT: Mapping[str, str] = package_table("report/templates/about.toml")
 """What the numbers on a page are, by its subject."""
 _beside: ContextVar[tuple[str, ...]] = ContextVar("beside", default=())
 

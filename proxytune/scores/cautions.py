@@ -27,7 +27,6 @@ SAME_LENGTH = 1.05
 CEILING = 0.1
 """A time limit is where at least this share of the episodes ends."""
 FEWEST_AT_CEILING = 3
-
 NAMED = ("agents", "episodes")
 SAME = "the proxy has the target's scores to the last digit; give another table, unless one is a copy on purpose"
 DISTINCT = 0.8
@@ -72,10 +71,8 @@ def _copies(table: ScoreTable, side: str) -> Iterator[str]:
     pooled = len(np.unique(np.concatenate(distinct), axis=0))
     kept = sum(map(len, distinct))
     if np.mean(repeated) >= 0.75 and pooled >= max(DISTINCT * kept, 4):
-        yield (
-            f"of {table.counts.sum()} episodes of {side} only {kept} differ from one another: the others are copies to "
-            "the last digit; give each once, or intervals come out too narrow"
-        )
+        few = f"of {table.counts.sum()} episodes of {side} only {kept} differ from one another"
+        yield f"{few}: the others are copies to the last digit; give each once, or intervals come out too narrow"
 
 
 def _signs(proxy: ScoreTable, target: ScoreTable, metrics: Sequence[Metric]) -> Iterator[str]:
@@ -95,10 +92,8 @@ def _tolerances(table: ScoreTable, metrics: Sequence[Metric], side: str) -> Iter
         merits, tie = metric.merits(table.means[:, place])
         if metric.tolerance and varies(table.means)[place] and np.ptp(merits) <= tie[0]:
             percent = " %" if metric.percent else ""
-            yield (
-                f"the tolerance of {metric.name}, {metric.tolerance:g}{percent}, leaves no two agents of {side} apart: "
-                "all tie; give a smaller one"
-            )
+            given = f"the tolerance of {metric.name}, {metric.tolerance:g}{percent}"
+            yield f"{given}, leaves no two agents of {side} apart: all tie; give a smaller one"
 
 
 def _lengths(proxy: ScoreTable, target: ScoreTable, metrics: Sequence[Metric]) -> Iterator[str]:
@@ -115,10 +110,8 @@ def _lengths(proxy: ScoreTable, target: ScoreTable, metrics: Sequence[Metric]) -
         factor = max(most, other) / min(most, other) if min(most, other) > 0.0 else 1.0
         other_unit = any(abs(factor / unit - 1.0) < 0.02 for unit in (60.0, 1e3, 1e6, 1e9))
         if shorter and factor > SAME_LENGTH and not other_unit:
-            yield (
-                f"episodes last up to {most:.4g} in the proxy and up to {other:.4g} on the target by {metric.name}; "
-                "give both sides one time limit, or scores that grow with time cannot be compared"
-            )
+            last = f"episodes last up to {most:.4g} in the proxy and up to {other:.4g} on the target by {metric.name}"
+            yield f"{last}; give both sides one time limit, or scores that grow with time cannot be compared"
 
 
 def _units(proxy: ScoreTable, target: ScoreTable, metrics: Sequence[Metric], *, alone: bool) -> Iterator[str]:

@@ -233,7 +233,5 @@ def check_sides(where: str, header: Sequence[str], metrics: Sequence[str]) -> No
     for name in metrics:
         own = {own_column(name, header, side) for side in ("proxy", "target")}
         if len(own) == 1 and None not in own:
-            raise ScoresError(
-                f"{where}: the column '{own.pop()}' would be both proxy and target; name the sides in the columns, "
-                "as 'Sim success' and 'Real success', or give two tables"
-            )
+            remedy = "name the sides in the columns, as 'Sim success' and 'Real success', or give two tables"
+            raise ScoresError(f"{where}: the column '{own.pop()}' would be both proxy and target; {remedy}")

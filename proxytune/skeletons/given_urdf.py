@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from proxytune import driving
 from proxytune.errors import InputError
+from proxytune.report import end_of
 from proxytune.skeletons.writing import Skeleton, check_figures, completed, robot_text, then
 
 WHEELS = ("wheel_radius", "wheel_distance")
@@ -54,15 +55,15 @@ def _name_joints(root: ET.Element, path: Path) -> Iterator[str]:
     """Name the joints of a car as the bullet plant calls them; says what was changed."""
     joints = [joint for joint in root.iter("joint") if joint.get("type") in ("revolute", "continuous")]
     upright = [joint for joint in joints if abs(_axis(root, joint)[2]) > driving.ACROSS]
-    front = {link for joint in upright for link in _below(root, _child(joint))}
-    rear = [joint for joint in joints if abs(_axis(root, joint)[1]) > driving.ACROSS and _child(joint) not in front]
+    front = {link for joint in upright for link in _below(root, end_of(joint, "child"))}
+    rear = [one for one in joints if abs(_axis(root, one)[1]) > driving.ACROSS and end_of(one, "child") not in front]
     for what, found, names in (("steer", upright, driving.STEERS), ("are driven, behind", rear, driving.AXLES)):
         pair = [one for one in found if one.get("name") in names] or found
         if len(pair) != 2:
             told = ", ".join(one.get("name", "") for one in pair) or "none"
             problem = f"{path}: a car needs two joints that {what}, found {told}"
             raise InputError(f"{problem}; call them {' and '.join(names)}")
-        pair.sort(key=lambda joint: -driving.link_pose(root, _child(joint))[1, 3])
+        pair.sort(key=lambda joint: -driving.link_pose(root, end_of(joint, "child"))[1, 3])
         for joint, name in zip(pair, names, strict=True):
             if joint.get("name") != name:
                 yield f"joint {joint.get('name')} is now called {name}"
@@ -70,17 +71,12 @@ def _name_joints(root: ET.Element, path: Path) -> Iterator[str]:
             joint.set("type", "revolute" if names is driving.STEERS else "continuous")
 
 
-def _child(joint: ET.Element) -> str:
-    child = joint.find("child")
-    return child.get("link", "") if child is not None else ""
-
-
 def _below(root: ET.Element, link: str) -> Iterator[str]:
     """A link and all that hang on it."""
     yield link
     for joint in root.iter("joint"):
-        if _parent(joint) == link:
-            yield from _below(root, _child(joint))
+        if end_of(joint, "parent") == link:
+            yield from _below(root, end_of(joint, "child"))
 
 
 def _axis(root: ET.Element, joint: ET.Element) -> NDArray[np.float64]:
@@ -88,7 +84,7 @@ def _axis(root: ET.Element, joint: ET.Element) -> NDArray[np.float64]:
     axis = joint.find("axis")
     said = axis.get("xyz", "1 0 0") if axis is not None else "1 0 0"
     direction = np.array([float(value) for value in said.split()])
-    turned = driving.link_pose(root, _child(joint))[:3, :3]
+    turned = driving.link_pose(root, end_of(joint, "child"))[:3, :3]
     return np.asarray(turned @ (direction / np.linalg.norm(direction)))
 
 
@@ -153,7 +149,7 @@ def _drop_empty_roots(root: ET.Element, path: Path) -> None:
         link = next((one for one in root.findall("link") if one.get("name") not in children), None)
         if link is None:
             raise InputError(f"{path}: has no root link: its joints go round in a circle; correct it")
-        below = [one for one in root.findall("joint") if _parent(one) == link.get("name")]
+        below = [one for one in root.findall("joint") if end_of(one, "parent") == link.get("name")]
         if link.find("inertial") is not None or len(below) != 1 or below[0].get("type") != "fixed":
             return
         if not np.allclose(driving.origin_of(below[0])[:3, :3], np.eye(3)):
@@ -167,17 +163,12 @@ def _move(root: ET.Element, shift: NDArray[np.float64]) -> None:
     children = {child.get("link") for child in root.findall("joint/child")}
     link = next(one for one in root.findall("link") if one.get("name") not in children)
     parts = [part for kind in ("inertial", "visual", "collision") for part in link.findall(kind)]
-    for element in (*parts, *(one for one in root.findall("joint") if _parent(one) == link.get("name"))):
+    for element in (*parts, *(one for one in root.findall("joint") if end_of(one, "parent") == link.get("name"))):
         origin = element.find("origin")
         if origin is None:
             origin = ET.SubElement(element, "origin")
         before = np.array([float(value) for value in origin.get("xyz", "0 0 0").split()])
         origin.set("xyz", _text(before - shift))
-
-
-def _parent(joint: ET.Element) -> str | None:
-    parent = joint.find("parent")
-    return None if parent is None else parent.get("link")
 
 
 def _text(values: Iterator[float] | NDArray[np.float64]) -> str:

@@ -8,12 +8,11 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import partial
-from types import MappingProxyType
 
 from proxytune.driving import UNITS, Robot
 from proxytune.effects import PARAMETERS
 from proxytune.errors import InputError, SettingsError
-from proxytune.files import fill_template
+from proxytune.files import fill_template, package_table
 from proxytune.settings import nearest
 
 
@@ -92,45 +91,8 @@ def family_skeleton(name: str) -> Skeleton:
     return Skeleton(files, (*commands(name), f"PYTHONPATH={name} python -m pytest {name}/test_{name}.py"), (note,))
 
 
-GUESSES: Mapping[str, tuple[float, str]] = MappingProxyType(
-    {
-        "wheel_radius": (0.033, "half a driven wheel's diameter"),
-        "wheel_distance": (0.16, "between the middles of the driven wheels"),
-        "full_speed": (0.5, "straight ahead at full duty"),
-        "motor_time_constant": (0.1, "time to 63 % of a new speed; 0 if at once"),
-        "camera_height": (0.11, "of the lens above the floor"),
-        "camera_pitch": (20.0, "how far the camera looks down"),
-        "effective_baseline": (0.16, "2 x full_speed / yaw rate when turning on the spot at full duty"),
-        "wheel_torque": (0.1, "stall torque of a wheel's motor"),
-        "mass": (1.0, "of the whole robot"),
-        "control_rate": (20.0, "how often an agent acts; divides 60"),
-        "camera_rate": (20.0, "pictures a second; divides 60"),
-        "camera_columns": (64.0, "a small picture, as wide to high as the camera's"),
-        "camera_rows": (48.0, "a small picture, as wide to high as the camera's"),
-        "camera_forward": (0.05, "of the lens ahead of the axle"),
-        "field_of_view": (70.0, "vertical, from the data sheet"),
-        "expert_look_ahead": (0.25, "for `teach` alone"),
-        "expert_speed": (0.2, "for `teach` alone"),
-        "expert_gain": (1.0, "for `teach` alone"),
-        "expert_disturbance": (0.1, "for `teach` alone"),
-    }
-)
-"""What is written where nothing is known of a figure, and how to know it."""
-CAR_GUESSES: Mapping[str, tuple[float, str]] = MappingProxyType(
-    {
-        "wheelbase": (0.26, "from the rear axle to the front one"),
-        "wheel_angle": (25.0, "greatest angle of the front wheels, mean of both sides"),
-        "wheel_radius": (0.033, "half a wheel's diameter"),
-        "wheel_distance": (0.16, "track width: between the middles of the rear wheels"),
-        "full_speed": (2.0, "straight ahead at full throttle"),
-        "mass": (1.6, "of the whole car"),
-        "camera_forward": (0.20, "of the lens ahead of the rear axle"),
-        "lane_width": (0.495, "of the lanes it is to follow, here car_loop's: shipped agents go by it"),
-        "expert_look_ahead": (0.45, "for `teach` alone"),
-        "expert_speed": (0.45, "for `teach` alone"),
-    }
-)
-"""The same of a car, where it differs."""
+GUESSES: Mapping[str, Mapping[str, tuple[float, str]]] = package_table("skeletons/templates/figures.toml")
+"""By how a robot drives, what is written where nothing is known of a figure, and how to know it."""
 SIX = ("wheel_radius", "wheel_distance", "full_speed", "motor_time_constant", "camera_height", "camera_pitch")
 """What a skeleton's body and model are made of; the rest can wait."""
 EIGHT = ("wheelbase", "wheel_angle", *SIX)
@@ -184,8 +146,8 @@ def check_figures(figures: Mapping[str, float]) -> None:
 
 
 def _guesses(drive: str) -> Mapping[str, tuple[float, str]]:
-    of_wheels = {name: guess for name, guess in GUESSES.items() if name != "effective_baseline"}
-    return GUESSES if drive == "differential" else {**of_wheels, **CAR_GUESSES}
+    guesses = {**GUESSES["differential"], **GUESSES[drive]}
+    return {name: one for name, one in guesses.items() if drive == "differential" or name != "effective_baseline"}
 
 
 def completed(figures: Mapping[str, float], drive: str = "differential") -> dict[str, float]:

@@ -11,9 +11,9 @@ While a study runs, what is written goes to `study.db-wal` first (SQLite's write
 the disk, and survives a `kill -9`). That file belongs to study.db until the next clean end of a run, which leaves the
 one file.
 
-Formats 1 to 6 were never released and are refused. From 7 on each format is converted until version 1.0: STEPS has what
-makes it of the one before. It is then verified as it was, read from a converted copy in memory, and becomes the present
-one when next written to.
+Formats 1 to 6 were never released and are refused. From 7 on each format is converted until version 1.0: formats/ has
+what makes it of the one before. It is then verified as it was, read from a converted copy in memory, and becomes the
+present one when next written to.
 """
 
 import hashlib
@@ -38,51 +38,11 @@ KEYS: Mapping[str, str] = {
 }
 """The tables whose rows have digests and are counted, each with the columns of which no two rows have the same."""
 FIRST = 7
-STEPS = (
-    """
-CREATE TABLE facts (key TEXT PRIMARY KEY, value TEXT NOT NULL, digest TEXT NOT NULL DEFAULT '') WITHOUT ROWID;
-CREATE TABLE instances (
-    id INTEGER PRIMARY KEY, identity TEXT NOT NULL, theta TEXT NOT NULL, digest TEXT NOT NULL DEFAULT '',
-    UNIQUE (identity, theta));
-CREATE TABLE trials (
-    objective TEXT NOT NULL, number INTEGER NOT NULL, instance INTEGER NOT NULL REFERENCES instances (id),
-    state TEXT NOT NULL CHECK (state IN ('open', 'finished', 'failed', 'cut')),
-    score REAL, measures TEXT NOT NULL DEFAULT '{}', failed_episodes INTEGER NOT NULL DEFAULT 0,
-    failure TEXT NOT NULL DEFAULT '', decided TEXT NOT NULL DEFAULT '[]', bound REAL, seconds REAL NOT NULL DEFAULT 0,
-    digest TEXT NOT NULL DEFAULT '', PRIMARY KEY (objective, number)) WITHOUT ROWID;
-CREATE TABLE episodes (
-    instance INTEGER NOT NULL REFERENCES instances (id), agent TEXT NOT NULL, start INTEGER NOT NULL,
-    seed INTEGER NOT NULL, metrics TEXT, failure TEXT, seconds REAL NOT NULL, code TEXT,
-    digest TEXT NOT NULL DEFAULT '',
-    PRIMARY KEY (instance, agent, start, seed), CHECK ((metrics IS NULL) <> (failure IS NULL))) WITHOUT ROWID;
-CREATE TABLE sweeps (
-    number INTEGER PRIMARY KEY, parameter TEXT NOT NULL, base TEXT NOT NULL, points TEXT NOT NULL,
-    identity TEXT NOT NULL, target_model TEXT NOT NULL DEFAULT '', replays TEXT NOT NULL DEFAULT '',
-    digest TEXT NOT NULL DEFAULT '', UNIQUE (parameter, base, points, identity, replays));
-CREATE TABLE under_way (
-    place INTEGER PRIMARY KEY CHECK (place = 1), identity TEXT NOT NULL, theta TEXT NOT NULL, agent TEXT NOT NULL,
-    start INTEGER NOT NULL, seed INTEGER NOT NULL, digest TEXT NOT NULL DEFAULT '');
-CREATE TABLE counts (name TEXT PRIMARY KEY, rows INTEGER NOT NULL) WITHOUT ROWID;
-""",
-    """
-ALTER TABLE under_way RENAME TO one_under_way;
-CREATE TABLE under_way (
-    place INTEGER PRIMARY KEY, identity TEXT NOT NULL, theta TEXT NOT NULL, agent TEXT NOT NULL,
-    start INTEGER NOT NULL, seed INTEGER NOT NULL, digest TEXT NOT NULL DEFAULT '');
-INSERT INTO under_way SELECT * FROM one_under_way;
-DROP TABLE one_under_way;
-""",
-)
+STEPS = tuple(path.read_text(encoding="utf-8") for path in sorted((Path(__file__).parent / "formats").glob("*.sql")))
 """What makes an empty database one of the first format, and then what makes each format the next."""
 FORMAT = FIRST + len(STEPS) - 1
-SINGULAR = {
-    "facts": "fact",
-    "instances": "domain instance",
-    "trials": "trial",
-    "episodes": "episode",
-    "sweeps": "sweep",
-    "under_way": "note of the episode under way",
-}
+SINGULAR = {"instances": "domain instance", "under_way": "note of the episode under way"}
+"""What a row is called where that is not its table's name without the s."""
 PATIENCE_S = 30.0
 WRITING = "PRAGMA journal_mode = WAL; PRAGMA synchronous = NORMAL; PRAGMA wal_autocheckpoint = 256;"
 """The write-ahead log stays at about 1 MiB: a disk may be small."""
@@ -237,21 +197,18 @@ def _explained(path: Path, problem: sqlite3.Error) -> StoreError:
     code = getattr(problem, "sqlite_errorcode", None) or 0
     match code & 0xFF:
         case sqlite3.SQLITE_FULL:
-            return StoreError(f"{path}: the disk is full; make room and run again, everything finished is kept")
+            why = "the disk is full; make room and run again, everything finished is kept"
         case sqlite3.SQLITE_IOERR:
-            return StoreError(
-                f"{path}: cannot be read or written ({problem}); is the disk full? Everything finished is kept"
-            )
+            why = f"cannot be read or written ({problem}); is the disk full? Everything finished is kept"
         case sqlite3.SQLITE_READONLY | sqlite3.SQLITE_CANTOPEN | sqlite3.SQLITE_PERM:
-            return StoreError(
-                f"{path}: cannot be written ({problem}); check the folder's permissions or copy the study"
-            )
+            why = f"cannot be written ({problem}); check the folder's permissions or copy the study"
         case sqlite3.SQLITE_BUSY | sqlite3.SQLITE_LOCKED:
-            return StoreError(f"{path}: another program holds it open for writing; close that and run again")
+            why = "another program holds it open for writing; close that and run again"
         case sqlite3.SQLITE_NOTADB | sqlite3.SQLITE_CORRUPT:
             return _corrupt(path, str(problem))
         case _:
-            return StoreError(f"{path}: {problem}; if it is damaged, restore a copy or move it away")
+            why = f"{problem}; if it is damaged, restore a copy or move it away"
+    return StoreError(f"{path}: {why}")
 
 
 def _corrupt(path: Path, detail: str) -> DamagedError:
@@ -299,10 +256,8 @@ def _refuse_programs(connection: sqlite3.Connection, path: Path) -> None:
     found = connection.execute(query).fetchone()
     if found:
         what, name = found
-        raise StoreError(
-            f"{path}: has a {what if what != 'table' else 'virtual table'} {name!r:.60}, which no proxytune made; "
-            "take its data only from who made it, or move it away"
-        )
+        has = f"has a {what if what != 'table' else 'virtual table'} {name!r:.60}, which no proxytune made"
+        raise StoreError(f"{path}: {has}; take its data only from who made it, or move it away")
 
 
 def _check_tables(connection: sqlite3.Connection, path: Path, version: int) -> None:
@@ -325,7 +280,7 @@ def _check_rows(connection: sqlite3.Connection, path: Path, version: int) -> Non
             found = connection.execute(f"SELECT digest, {', '.join(columns)} FROM {table}").fetchall()
             count = sum(row[0] != digest_of(*row[1:]) for row in found)
             count += abs(rows[table] - len(found)) if table in rows else 1
-            damage += [f"{count} {SINGULAR[table]}{'s' * (count > 1)}"] if count else []
+            damage += [f"{count} {SINGULAR.get(table, table[:-1])}{'s' * (count > 1)}"] if count else []
     if damage:
         remedy = f"run: python -m proxytune repair {path.parent}, which keeps all else"
         raise DamagedError(f"{path}: is damaged, or was edited by hand: {', '.join(damage)}; {remedy}")

@@ -127,7 +127,6 @@ def test_arrays_are_known_by_content_and_pickles_and_what_is_no_npz_are_refused(
     np.save(tmp_path / "one.npy", TIMES)
     assert is_arrays(tmp_path / "one.npy")
     assert "no .npz file; save the arrays again" in complaint(tmp_path / "one.npy")
-    assert "no such file" in complaint(tmp_path / "none.npz")
     path = write_arrays(tmp_path)
     assert is_arrays(path)
     assert is_arrays(path.rename(tmp_path / "log.bin"))

@@ -272,7 +272,6 @@ def test_missing_files_and_folders_without_any_are_told(tmp_path, file):
     assert "has no CSV file with poses" in complaint(tmp_path, commands="run1.csv")
     assert not is_mrclam(tmp_path)
     assert not is_mrclam(tmp_path / "Robot1_Odometry.dat")
-    assert "has no file such as Robot1_Groundtruth.dat" in complaint(tmp_path, read_mrclam)
 
 
 def test_tables_and_trajectories_are_known_by_content(tmp_path, file):

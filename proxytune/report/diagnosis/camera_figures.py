@@ -98,6 +98,7 @@ HELD = 0.05
 """Part of an arrow along edges, of which nothing is seen, as a share of the points' weight: it is drawn short."""
 KEYS_PX = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0)
 """Lengths that the scale may show [pixel]."""
+PIXELS = ("column [px]", "row [px]")
 TITLE = 28
 """Characters in a line above a panel."""
 
@@ -135,7 +136,7 @@ def displacement_figure(diagnosis: CameraDiagnosis) -> Figure:
         axes.set_title(names[number], fontsize=7)
         quiver = axes.quiver(*one.places.T, *one.lengths.T, color=COLOURS[number % len(models)], **look)
         axes.quiverkey(quiver, 0.88, 0.93, key, f"{key:g} px", labelpos="S", fontproperties={"size": 7})
-    label_places(panels)
+    style.label_sides(panels, *PIXELS)
     return figure
 
 
@@ -182,7 +183,7 @@ def markings_figure(diagnosis: CameraDiagnosis) -> Figure:
             if np.isfinite(distance).any() and np.nanmin(distance) < 0.0 < np.nanmax(distance):
                 axes.contour(across_, up, distance, levels=[0.0], colors=colour, linewidths=0.9)
         axes.set_title(fill(f"{name}, frame {diagnosis.gathered.numbers[frame]}", TITLE), fontsize=7)
-    label_places(panels)
+    style.label_sides(panels, *PIXELS)
     return figure
 
 
@@ -224,13 +225,3 @@ def camera_models(diagnosis: CameraDiagnosis) -> Mapping[str, CameraFit]:
     declared, model = diagnosis.named.declared, diagnosis.named.model
     before = replace(declared, state=replace(model.state, theta=declared.theta))
     return {DECLARED_MODEL: before} | ({with_effects(bent): model} if bent else {})
-
-
-def label_places(panels: NDArray[np.object_]) -> None:
-    """Say once along each side of a grid of pictures what its axes are."""
-    for axes in panels.ravel():
-        axes.tick_params(labelsize=7)
-    for axes in panels[-1]:
-        axes.set_xlabel("column [px]", fontsize=8)
-    for axes in panels[:, 0]:
-        axes.set_ylabel("row [px]", fontsize=8)

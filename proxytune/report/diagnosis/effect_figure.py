@@ -21,7 +21,8 @@ from proxytune.diagnosis import (
     refit_beside_curve,
     wheel_speeds,
 )
-from proxytune.effects import TURN, Catalogue, Means, Panel, WheelCurve, track_of
+from proxytune.effects import Catalogue, Means, Panel, WheelCurve, track_of
+from proxytune.files import package_table
 from proxytune.report import figure_style as style
 from proxytune.report.diagnosis.error_figures import DECLARED_MODEL, extended_name
 from proxytune.space import Theta
@@ -184,40 +185,12 @@ BINS = 20
 """Values of the signal, equally often driven, over which means are taken."""
 MEASURED, ANY = "measured", "free curve"
 DEGREES = 180.0 / np.pi
+_TABLES = package_table("report/templates/panels.toml")
 CUE_PANELS: Mapping[str, tuple[Panel, ...]] = {
-    "wheel command": (
-        Panel("left", "speed of the left wheel [m/s]", "left"),
-        Panel("right", "speed of the right wheel [m/s]", "right"),
-    ),
-    "steering": tuple(Panel("", "steering [full lock]", m, m == "forward") for m in ("forward", "turn")),
-    "difference of the wheel commands": tuple(
-        Panel("", "right less left command [duty]", m) for m in ("forward", "turn")
-    ),
-    "command transients": tuple(
-        Panel("", "left command less its slow average [duty]", motion) for motion in ("left", "forward")
-    ),
-    "distance since reversal": (Panel("", "way since the left wheel reversed [m]", "left", True),),
-    "time in the episode": tuple(Panel("", "time in the episode [s]", side, True) for side in ("left", "right")),
-    "cumulated use": tuple(Panel("", "use so far [s at full duty]", m, True) for m in ("forward", "turn")),
-    "turn rate": (Panel("turn", TURN, "forward", True), Panel("turn", TURN, "turn")),
-    "heading": tuple(Panel("heading", "heading [deg]", motion) for motion in ("forward", "turn")),
-    "position": (
-        Panel("x", "x [m]", "forward", True),
-        Panel("y", "y [m]", "forward", True),
-        Panel("x", "x [m]", "turn"),
-    ),
-    "left wheel angle": (Panel("", "angle of the left wheel [rad]", "left", True),),
-    "right wheel angle": (Panel("", "angle of the right wheel [rad]", "right", True),),
-    "direction of travel": tuple(Panel("", "direction of travel", m, True) for m in ("forward", "turn")),
+    group: tuple(Panel(*panel) for panel in panels) for group, panels in _TABLES["panels"].items()
 }
 """Panels drawn for a signal group."""
-NAMES = {
-    "forward": "forward speed",
-    "sideways": "speed to the left",
-    "turn": "turn rate",
-    "left": "left wheel speed",
-    "right": "right wheel speed",
-}
+NAMES: Mapping[str, str] = _TABLES["motions"]
 
 
 class Rates(NamedTuple):

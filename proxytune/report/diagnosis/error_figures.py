@@ -164,10 +164,7 @@ def _lines(axes: Axes, drives: Drives, strayed: Strayed, colour: str) -> list[tu
 
 
 def residual_map(drives: Drives, both: Mapping[str, Strayed]) -> Figure:
-    """The measured paths in the colours of the distance, or its mean by place where too many paths would overlap.
-
-    All maps share one logarithmic scale. Arrows say in which direction the paths were driven.
-    """
+    """The measured paths in the colours of the distance, or its mean by place where too many paths would overlap."""
     before = next(iter(both.values()))
     extent = np.ptp(drives.poses[before.increment, 1, :2], axis=0)
     # Maps stand above each other, where the floor is long, or side by side.
@@ -176,10 +173,7 @@ def residual_map(drives: Drives, both: Mapping[str, Strayed]) -> Figure:
     down = len(both) // across
     figure, grid = style.grid_of(min(tall, TALLEST) * down + 1.2, down, across, sharex=True, sharey=True)
     panels = list(grid.ravel())
-    for axes in grid[:, 0]:
-        axes.set_ylabel("y [m]", fontsize=8)
-    for axes in grid[-1]:
-        axes.set_xlabel("x [m]", fontsize=8)
+    style.label_sides(grid, "x [m]", "y [m]")
     # From the smallest distances of any model to the largest of all, but for a few; at least a factor of ten
     low, high = np.quantile(np.concatenate([one.rms for one in both.values()]), (0.02, 0.98))
     high = max(float(high), TINIEST_MM)

@@ -11,6 +11,7 @@ from matplotlib.ticker import FuncFormatter
 
 from proxytune.diagnosis import Diagnosis, Findings, Learning, Rules
 from proxytune.effects import GROUPS, HEADING, LEVEL, OF_PLACE, PLACE, Learnt, LearntCurve, learnt_effect
+from proxytune.files import package_table
 from proxytune.report import figure_style as style
 from proxytune.report.diagnosis.effect_figure import effect_curve
 from proxytune.report.diagnosis.error_figures import error_figure, residual_map, residual_over_time, strayed
@@ -18,11 +19,7 @@ from proxytune.report.wording import plain
 
 
 def motion_figures(diagnosis: Diagnosis) -> Mapping[str, Figure]:
-    """Draw everything that a diagnosis has to show, by the name of the figure.
-
-    What has nothing to show is left out: the curve of an effect where none was added and no signal explains anything,
-    the learnt curves where none are used.
-    """
+    """Draw everything that a diagnosis has to show, by the name of the figure; what has nothing to show is left out."""
     both = strayed(diagnosis)
     figures = {
         "residual_over_time": residual_over_time(diagnosis.parts.tested, both),
@@ -43,8 +40,6 @@ LINEAR = 20.0
 """Evidence of no more than so many thresholds is drawn on a linear axis."""
 ROW, ELSE = 0.145, 0.95
 """Height of a row, and of all else [inch]."""
-
-
 ADDED = style.Role("added", style.BLUE)
 RIVAL = style.Role("fits as well as one added", style.LIGHT_BLUE)
 OTHER = style.Role("not added", style.GREY)
@@ -102,26 +97,10 @@ def _scale(axes: Axes, gains: Sequence[float], least: float) -> None:
 
 SHOWN_AS = {"m/s": (1e3, "mm/s"), "rad/s": (180.0 / np.pi, "deg/s"), "rad/m": (180.0 / np.pi, "deg/m")}
 """Units in which weights are told, by their own: a factor and its unit; shares in per cent."""
-FADING = {
-    "changes": "time constant",
-    "transients": "time constant",
-    "load": "time constant",
-    "reversal": "fading over",
-    "start": "fading over",
-    "ringing": "frequency",
-    "play": "half the play",
-    "held": "from then on",
-    "begun": "until then",
-    "turned": "until then",
-    "dragged": "half the play",
-    "ended": "time constant",
-}
+_WORDS = package_table("report/templates/learnt.toml")
+FADING: Mapping[str, str] = _WORDS["fading"]
 """Groups whose weights are points, each of something that fades or ends, and what their knots are."""
-PAIRS = {
-    "speed_and_turn": ("forward speed [m/s]", "yaw rate [rad/s]"),
-    "place": ("x [m]", "y [m]"),
-    "ramped": ("from 0 to 1 [s]", "back to 0 [s]"),
-}
+PAIRS: Mapping[str, tuple[str, str]] = _WORDS["pairs"]
 """Groups over two signals, and what their axes are called."""
 WIDEST, HIGHEST = 20, 18
 """Characters in a line below a panel, and beside it."""

@@ -1,6 +1,5 @@
 """Sentences of a diagnosis of motion: each effect and its worth, what is left, clocks, what to drive next."""
 
-import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
@@ -8,11 +7,11 @@ import numpy as np
 
 from proxytune.diagnosis import AdoptedEffect, Clocks, Diagnosis, EffectSize, Learning, Offset, Ratio, RobotClusters
 from proxytune.effects import PLACE, is_learnt, learnt_effect
+from proxytune.files import package_table
 from proxytune.report.wording import fixed, listed, percent
-from proxytune.report.writing import fill
 from proxytune.space import Theta
 
-VERDICTS: Mapping[str, Mapping[str, str]] = tomllib.loads(fill("verdicts.toml"))
+VERDICTS: Mapping[str, Mapping[str, str]] = package_table("report/templates/verdicts.toml")
 """What each verdict means, of motion and of the camera, and the next step."""
 AMPLE = 30.0
 """Log-likelihood gain [nats] in a minute above which one minute surely decides."""
@@ -165,11 +164,10 @@ def _say_clocks(clocks: Clocks) -> Iterator[str]:
         yield f"{lag}; {stamped} if the robot's delay is {assumed:.2f} s; {corrected}"
     if clocks.drift.value:
         low, high = sorted(1e2 * abs(end) for end in clocks.drift.interval)
-        yield (
-            f"the poses' clock runs {1e2 * abs(clocks.drift.value):.2g} % ({low:.2g} to {high:.2g}) "
-            f"{'faster' if clocks.drift.value > 0.0 else 'slower'} than that of the commands; this was corrected. "
-            "Stamp both with one clock, or synchronise them"
-        )
+        runs = f"{1e2 * abs(clocks.drift.value):.2g} % ({low:.2g} to {high:.2g})"
+        way = f"{'faster' if clocks.drift.value > 0.0 else 'slower'} than that of the commands"
+        corrected = "this was corrected. Stamp both with one clock, or synchronise them"
+        yield f"the poses' clock runs {runs} {way}; {corrected}"
     for name, one in clocks.drives.items():
         stamped = f"{abs(one.value):.2f} s {'earlier' if one.value < 0.0 else 'later'} ({_ends_s(one)})"
         others = f"in drive {name} poses are stamped {stamped} than in the others"

@@ -1,7 +1,7 @@
 """Still picture of an episode, the map that a movie has too, the scores in proxy and target, and when the two part."""
 
 import functools
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -10,7 +10,7 @@ from matplotlib.figure import Figure, SubFigure
 from matplotlib.patheffects import Stroke, withStroke
 
 from proxytune.arrays import Floats
-from proxytune.driving import Road, draw_floor
+from proxytune.driving import draw_floor
 from proxytune.report import figure_style as style
 from proxytune.report.text import WholeWords, table_text
 from proxytune.report.view import Table, columns_of
@@ -60,8 +60,7 @@ INSTANTS = 4
 
 def episode_figure(pair: SideBySide, metrics: Sequence[str]) -> Figure:
     """Draw an episode, of which places are known on every side, with these metrics above the map."""
-    paths = [episode.places for episode in pair.sides.values()]
-    width, height = pair.road.size if pair.road is not None else np.subtract(*_bounds(paths)[::-1])
+    width, height = pair.road.size if pair.road is not None else np.subtract(*_bounds(pair)[::-1])
     aspect = float(np.clip(height / width, 0.4, 2.0))
     parts: list[tuple[float, Callable[[SubFigure], None]]] = [
         (0.85 * style.COLUMN * aspect + 0.35 + 2 * LINE_INCH, functools.partial(_draw_map, pair, metrics))
@@ -80,7 +79,7 @@ def episode_figure(pair: SideBySide, metrics: Sequence[str]) -> Figure:
 
 def _draw_map(pair: SideBySide, metrics: Sequence[str], figure: SubFigure) -> None:
     axes = figure.subplots()
-    draw_map(axes, pair.road, [episode.places for episode in pair.sides.values()])
+    draw_map(axes, pair)
     draw_paths(axes, pair)
     if pair.parted_s is not None:
         place = pair.proxy.places[np.searchsorted(pair.proxy.poses["time"], pair.parted_s)]
@@ -145,9 +144,9 @@ HALO = (withStroke(linewidth=2.0, foreground="white"),)
 """A white edge round letters."""
 
 
-def draw_map(axes: Axes, road: Road | None, paths: Iterable[Floats]) -> None:
-    """Draw the floor that the camera sees, from above; without a road only axes round the paths (times, 2) [m]."""
-    if road is not None:
+def draw_map(axes: Axes, pair: SideBySide) -> None:
+    """Draw the floor that the camera sees, from above; without a road only axes round the paths."""
+    if (road := pair.road) is not None:
         floor = draw_floor(road)
         end = floor.origin + len(floor.pixels) / floor.pixels_per_metre
         # Every other pixel shows the markings as well, at a quarter of the work
@@ -156,7 +155,7 @@ def draw_map(axes: Axes, road: Road | None, paths: Iterable[Floats]) -> None:
         style.show_photo(axes, paler, extent=box, origin="lower", interpolation="antialiased")
         axes.set(xlim=(0.0, road.size[0]), ylim=(0.0, road.size[1]))
     else:
-        low, high = _bounds(paths)
+        low, high = _bounds(pair)
         axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
     axes.set_aspect("equal")
     style.dress(axes)
@@ -164,8 +163,8 @@ def draw_map(axes: Axes, road: Road | None, paths: Iterable[Floats]) -> None:
     axes.set_ylabel("y [m]", fontsize=7)
 
 
-def _bounds(paths: Iterable[Floats]) -> tuple[Floats, Floats]:
-    places = np.concatenate(list(paths))
+def _bounds(pair: SideBySide) -> tuple[Floats, Floats]:
+    places = np.concatenate([episode.places for episode in pair.sides.values()])
     return places.min(axis=0) - MARGIN_M, places.max(axis=0) + MARGIN_M
 
 

@@ -1,6 +1,5 @@
 """Episodes as files, by what the file is called: a PNG, or proxy and target beside each other as a GIF or an MP4."""
 
-import contextlib
 import importlib
 import logging
 import shutil
@@ -69,7 +68,7 @@ class _View:
         self._episode = pair.sides[side]
         upper, lower = figure.subfigures(2, 1, height_ratios=(3.4, 1.9), squeeze=False)[:, 0]
         map_axes = upper.subplots()
-        draw_map(map_axes, pair.road, [episode.places for episode in pair.sides.values()])
+        draw_map(map_axes, pair)
         draw_start(map_axes, self._episode.places)
         map_axes.set_title(side, color=COLOURS[side], fontsize=11, fontweight="bold", loc="left")
         line: dict[str, Any] = {"color": COLOURS[side], "animated": True}
@@ -220,22 +219,15 @@ def find_ffmpeg() -> str:
 
 def write_mp4(path: Path, frames: Iterable[Frame], frame_hz: float) -> None:
     """Write an MP4 of frames (rows, columns, 3), whose numbers of rows and columns are even; refused without ffmpeg."""
-    with matplotlib.rc_context({"animation.ffmpeg_path": find_ffmpeg()}), _quiet():
-        try:
-            write_whole(path, "the animation ", lambda draft: _encode(draft, iter(frames), frame_hz))
-        except subprocess.CalledProcessError as problem:
-            said = f"{problem.stderr}".strip().splitlines()[-1:] or [f"exit status {problem.returncode}"]
-            raise RunError(f"{path}: ffmpeg cannot encode it ({said[0]}); write a .gif instead") from None
-
-
-@contextlib.contextmanager
-def _quiet() -> Iterator[None]:
-    """Without matplotlib's account of what ffmpeg said: we say it in one line."""
     log = logging.getLogger("matplotlib.animation")
     level = log.level
-    log.setLevel(logging.ERROR)
+    log.setLevel(logging.ERROR)  # What ffmpeg said is said in one line
     try:
-        yield
+        with matplotlib.rc_context({"animation.ffmpeg_path": find_ffmpeg()}):
+            write_whole(path, "the animation ", lambda draft: _encode(draft, iter(frames), frame_hz))
+    except subprocess.CalledProcessError as problem:
+        said = f"{problem.stderr}".strip().splitlines()[-1:] or [f"exit status {problem.returncode}"]
+        raise RunError(f"{path}: ffmpeg cannot encode it ({said[0]}); write a .gif instead") from None
     finally:
         log.setLevel(level)
 

@@ -1,7 +1,6 @@
 """Domain instance in the figures that other simulators take, and where each effect goes in each format."""
 
 import re
-import tomllib
 from collections.abc import Container, Mapping
 from dataclasses import dataclass
 
@@ -11,7 +10,7 @@ from proxytune.arrays import Floats
 from proxytune.driving import CAMERA, CameraFigures, Robot, mounted_camera, orientation, rotation
 from proxytune.effects import SHIPPED, SMALLEST_LIMIT, Effect, Stage, effect_of, effects_from
 from proxytune.errors import InputError
-from proxytune.report.writing import fill
+from proxytune.files import package_table
 from proxytune.space import Theta
 
 Pair = tuple[float, float]
@@ -166,15 +165,11 @@ def xml_comment(instance: Instance, form: str, columns: int) -> str:
 
 FORMATS = ("urdf", "mjcf", "ros")
 """Formats that can be written, as `export --to` calls it."""
-
 FILTER = "filter"
 """What `export --to` calls the ROS 2 node that bends commands as was found."""
-
 IN_WHEELS = ("trim", "wheel_gain", "yaw_scrub")
 """Effects that a patched file has by its wheels' radii and distance; what such a file has is undone by a filter."""
-
-
-_TABLES = tomllib.loads(fill("places.toml"))
+_TABLES = package_table("report/templates/places.toml")
 _MOUNTED = {effect: places for places in _TABLES.pop("mounted") for effect in places["effects"]}
 PLACES: Mapping[str, Mapping[str, Mapping[str, str]]] = {drive: own | _MOUNTED for drive, own in _TABLES.items()}
 """By how the robot drives, the effects that have a place; a user's own and what was learnt have none."""

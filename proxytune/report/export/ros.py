@@ -1,16 +1,16 @@
 """For ROS 2: parameters of a controller, a node that bends commands as was found, and one that plays a drive."""
 
 import math
-import tomllib
 from collections.abc import Sequence
 from pprint import pformat
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
-from proxytune.arrays import Floats
 from proxytune.diagnosis import Diagnosis, commands_as
 from proxytune.driving import REQUIRED, CameraFigures, Robot
 from proxytune.effects import effect_of, is_learnt
+from proxytune.files import package_table
 from proxytune.logs import CAR_COMMANDS, COMMANDS
 from proxytune.report.export.instance import BENT, FILTER, Instance, header
 from proxytune.report.writing import fill
@@ -27,7 +27,11 @@ def ros_text(instance: Instance) -> str:
     parts = [_car(instance) if instance.steers else _wheels(instance)]
     if (camera := instance.camera) is not None:
         parts.append(_camera_info(camera))
-    parts += [_transform(child, pose) for child, pose in instance.mounts.items()]
+    # Parameters of tf2_ros' static_transform_publisher; base_link is the middle of the axle, on the floor.
+    for child, pose in instance.mounts.items():
+        numbers = (*pose[:3, 3].tolist(), *Rotation.from_matrix(pose[:3, :3]).as_quat(canonical=True).tolist())
+        names = ("x", "y", "z", "qx", "qy", "qz", "qw")
+        parts.append(_filled("ros_transform", child=child, **dict(zip(names, numbers, strict=True))))
     return "".join([*(f"# {line}\n" for line in header(instance, "ros")), *parts])
 
 
@@ -74,17 +78,6 @@ def _camera_info(figures: CameraFigures) -> str:
     return _filled("ros_camera", **size, **numbers)
 
 
-def _transform(child: str, pose: Floats) -> str:
-    """Parameters of tf2_ros' static_transform_publisher; base_link is the middle of the axle, on the floor."""
-    # The quaternion of a rotation by less than half a turn
-    turned = pose[:3, :3]
-    w = math.sqrt(max(1e-12, 1.0 + float(np.trace(turned)))) / 2.0
-    skew = turned - turned.T
-    turn = (*(float(skew[at]) / 4.0 / w for at in ((2, 1), (0, 2), (1, 0))), w)
-    names = ("x", "y", "z", "qx", "qy", "qz", "qw")
-    return _filled("ros_transform", child=child, **dict(zip(names, (*pose[:3, 3].tolist(), *turn), strict=True)))
-
-
 def _filled(template: str, **values: float | str) -> str:
     """A template with numbers as ROS tells them from whole ones: with a point."""
     said = {}
@@ -122,7 +115,7 @@ def player_text(diagnosis: Diagnosis) -> str:
     """The node for the next drive of a diagnosis that has one, as a Python file."""
     drive, kind = diagnosis.next_drive, diagnosis.command
     assert drive is not None
-    told = tomllib.loads(fill("player.toml"))["ackermann" if kind in CAR_COMMANDS else "twist"]
+    told = package_table("report/templates/player.toml")["ackermann" if kind in CAR_COMMANDS else "twist"]
     return fill(
         "player.py.txt",
         **told,

@@ -21,12 +21,7 @@ TWO_LINES = 0.14
 
 
 def convergence_figure(result: StudyResult) -> Figure:
-    """Draw every trial's PRPV, that of the answer so far, and at its ends the nominal θ's and the answer's.
-
-    Where the objective is another measure, that is drawn in its place. The answer so far is the visited θ of lowest
-    expected PRPV, which need not be the luckiest trial. Open points come from the quasi-random design, triangles are
-    what PRPV of trials that were cut off cannot be below, and the diamond is of episodes that nothing was chosen by.
-    """
+    """Draw PRPV, or another objective, of every trial and of the answer so far; at the ends nominal θ and answer."""
     figure, axes = style.one_panel(2.9)
     _draw_trials(axes, result)
     pairs = zip(result.trials, result.answers, strict=True)
@@ -85,11 +80,7 @@ SMOOTH_PROFILE = 0.5
 
 
 def profiles_figure(result: StudyResult) -> Figure:
-    """Draw how probable each value of each parameter is, given the target's scores, over the box that was searched.
-
-    Grey is excluded: outside the 95 % interval, which is written above. The vertical line is the answer; the triangle
-    is the θ that made the target, where that is known.
-    """
+    """Draw how probable each value of each parameter is, given the target's scores, over the box that was searched."""
     intervals = result.study.settings.space.intervals
     figure, panels = style.panel_grid(len(intervals), 1.3, 0.45)
     for place, axes in enumerate(panels):
@@ -151,12 +142,7 @@ MARKS = {"answer": (style.VERMILLION, "o", 8.0, "none"), "truth": ("black", "v",
 
 
 def evaluations_figure(result: StudyResult) -> Figure:
-    """Draw where the trials went, each pair of parameters in a panel, on the shadow of the 95 % region.
-
-    A long, slanting shadow is a pair that makes up for each other. The darker a point, the lower its PRPV; an open one
-    was cut off, and its PRPV is an estimate; crosses are trials that failed; the ring is the answer, the triangle the θ
-    that made the target, where that is known. Of a single parameter, PRPV is drawn over its range.
-    """
+    """Draw where the trials went, a panel a pair, on the 95 % region's shadow; of one parameter PRPV over its range."""
     count = len(result.study.settings.space.intervals)
     cells = max(1, count - 1)
     columns = max(2, cells)
@@ -264,10 +250,7 @@ def _shadow(axes: Axes, result: StudyResult, places: tuple[int, int]) -> None:
 
 
 def importance_figure(result: StudyResult) -> Figure:
-    """Draw each parameter's share in PRPV's variance over the box, most important first, with its 95 % interval.
-
-    The dot is what it takes part in, alone or together with others; the stroke is what it does alone.
-    """
+    """Draw each parameter's share in PRPV's variance over the box, most important first, with its 95 % interval."""
     ordered = sorted(result.importances, key=lambda one: one.share)
     figure, axes = style.one_panel(1.1 + 0.25 * len(ordered))
     places = np.arange(len(ordered))

@@ -21,12 +21,8 @@ from proxytune.study import LEARNING, PRPV, StudyResult, StudySettings
 from proxytune.usefulness import LEFT_OUT, PAIRED, PERFECT
 
 Rows = list[tuple[str, ...]]
-THETA, USEFULNESS, INFORMATION, SEARCH = (
-    "Parameters",
-    "Usefulness at the best θ (lower is better; 95 % intervals)",
-    "What informs each parameter",
-    "Search",
-)
+THETA, INFORMATION, SEARCH = "Parameters", "What informs each parameter", "Search"
+USEFULNESS = "Usefulness at the best θ (lower is better; 95 % intervals)"
 IN_SEARCH, MISFIT = "  in search", "misfit (p)"
 AGENTS, METRICS = 2, 1
 """Numbers of agents and metrics that are named of those that inform a parameter most."""

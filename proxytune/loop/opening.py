@@ -10,7 +10,6 @@ import os
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +18,6 @@ from proxytune.api import recordable
 from proxytune.domain import DomainFamily, Episode
 from proxytune.driving import AGENTS, LaneFollowing
 from proxytune.errors import InputError, LogError, RunError, SettingsError, StoreError
-from proxytune.extensions import ask
 from proxytune.importing import Facts, open_log
 from proxytune.logs import Log
 from proxytune.report import write_text
@@ -156,7 +154,7 @@ def open_loop(path: Path, twin: Path | None = None, log: Path | None = None) -> 
     loop = Loop(settings, family, robot, twin, log, held_out_of(settings, family, driven=twin is not None))
     for name in loop.held_out:
         try:
-            ask(f"check_agent('{name}') of {settings.family}", partial(family.check_agent, name))
+            family.check_agent(name)
         except InputError as problem:
             raise settings.error(KEY, str(problem)) from None
     _check_log(loop)

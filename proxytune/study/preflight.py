@@ -199,7 +199,7 @@ def run_preflight(run: StudyRun) -> Preflight | None:
     """
     if run.finished_trials():
         return None
-    learnt = _preflight(run, drive=True)
+    learnt = preflight_of(run, drive=True)
     if learnt is None or learnt.failure:
         return learnt
     first = _places(run.settings, 0)[0]
@@ -207,12 +207,8 @@ def run_preflight(run: StudyRun) -> Preflight | None:
     return replace(learnt, not_repeatable=not_repeatable(run.store))
 
 
-def preflight_of(run: StudyRun) -> Preflight | None:
-    """The pre-flight from what has been simulated; None if it is off, or an episode is still missing."""
-    return _preflight(run, drive=False)
-
-
-def _preflight(run: StudyRun, *, drive: bool) -> Preflight | None:
+def preflight_of(run: StudyRun, *, drive: bool = False) -> Preflight | None:
+    """The pre-flight from what has been simulated, or is now; None if it is off, or an episode is still missing."""
     settings = run.settings
     if not settings.preflight:
         return None

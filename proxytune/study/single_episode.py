@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from proxytune.domain import DomainFamily, Episode, Recording
 from proxytune.effects import is_learnt, parameter_hint
-from proxytune.errors import EpisodeError, InputError, ProxytuneError
-from proxytune.extensions import describe
+from proxytune.errors import EpisodeError, InputError
 from proxytune.running import run_episode
 from proxytune.settings import read_settings
 from proxytune.space import Theta
@@ -60,12 +59,7 @@ def check_episode(family: DomainFamily, agent: str, theta: Theta, start: int) ->
     Raises:
         InputError: With what it has.
     """
-    try:
-        family.check_agent(agent)
-    except ProxytuneError:
-        raise
-    except Exception as problem:
-        raise InputError(f"agent '{agent}': check_agent of the domain family raised {describe(problem)}") from problem
+    family.check_agent(agent)
     if not 0 <= start < family.starts:
         raise InputError(f"start {start}: the family has {family.starts}; give 0 to {family.starts - 1}")
     # A model.toml checks its learnt curves where it is read; a family that is built of effects drives them.

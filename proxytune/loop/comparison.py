@@ -81,16 +81,16 @@ def compare_errors(diagnosis: Mapping[str, Any]) -> list[Compared]:
 def _compare_error(key: str, title: str, error: Mapping[str, Any]) -> Compared:
     scale, unit = (1000.0, "mm") if error["unit"] == "m" else (1.0, error["unit"])
     low, high = (error.get(name) for name in ("noise_floor", "noise_floor_upper"))
-    bracket = _ends(low, high, scale)
+    bracket = _ends(low, high, scale=scale)
     floor = scale * low if low is not None and bracket is None else None
     before, after = (
-        Level(scale * error[side], _ends(*error[f"{side}_interval"], scale), floor, bracket)
+        Level(scale * error[side], _ends(*error[f"{side}_interval"], scale=scale), floor, bracket)
         for side in ("before", "after")
     )
     return Compared(key, title.format(error.get("horizon_s", 0.0)), unit, before, after)
 
 
-def _ends(low: float | None, high: float | None, scale: float = 1) -> Ends | None:
+def _ends(low: float | None, high: float | None, *, scale: float = 1) -> Ends | None:
     return None if low is None or high is None else (scale * low, scale * high)
 
 

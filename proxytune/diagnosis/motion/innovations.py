@@ -380,18 +380,13 @@ LearntMotion = list[tuple[Floats, Floats]]
 
 
 def window_features(drives: Drives, theta: Theta, learnt: Learnt, begin: Whole, length: int) -> Iterator[LearntMotion]:
-    """Motion that each weight of a learnt effect beside a model adds in such windows, but those over commands."""
-    whole = twists_of(drives, theta)
+    """Motion that each weight of a learnt effect beside a model adds in such windows, those over commands last."""
+    whole, asked = twists_of(drives, theta), window_twists(drives, theta, begin, length)
     past = learnt.recall(_window_setting(drives, begin, whole), whole, drives.episode[begin], drives.first[begin])
-    yield from ([one] for one in learnt.features(window_twists(drives, theta, begin, length), past))
-
-
-def window_command_features(
-    drives: Drives, theta: Theta, learnt: Learnt, begin: Whole, length: int
-) -> Iterator[LearntMotion]:
-    """Motion that each weight over commands adds in such windows: every one is a replay of the drives."""
-    arrived, asked = arrived_commands(drives, theta), window_twists(drives, theta, begin, length)
-    for features in learnt.commands.features(arrived, learnt.commands.begin(_setting(drives))):
+    yield from ([one] for one in learnt.features(asked, past))
+    # Every weight over commands is a replay of the drives.
+    arrived, before = arrived_commands(drives, theta), learnt.commands.begin(_setting(drives))
+    for features in learnt.commands.features(arrived, before):
         moved = np.empty((3, features.shape[-1], *asked.shape[:2]))
         for number, column in enumerate(np.moveaxis(features, -1, 0)):
             twists = window_twists(drives, theta, begin, length, SMALL_DUTY * column)

@@ -8,7 +8,6 @@ that were driven several times from the same commands: no model can predict what
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
-from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
@@ -375,10 +374,7 @@ def slopes_of(drives: Drives, theta: Theta, offered: Learnt, free: Sequence[inno
     twists, walked, predicted = walk(theta)
     measured = measured_motion(drives, windows)
     way = float(np.median(np.hypot(measured[:, 0], measured[:, 1])))
-    features = chain(
-        innovations.window_features(drives, named, offered, begin, length),
-        innovations.window_command_features(drives, named, offered, begin, length),
-    )
+    features = innovations.window_features(drives, named, offered, begin, length)
     changes = _pose_slopes(twists, walked, features, (window, tick - 1), 1.0 / drives.tick_hz)
     # Seen from the frame in which each window's tracked place begins.
     cosine, sine = (part[:, None] for part in cosine_and_sine(-walked[window, 0, 2]))

@@ -11,7 +11,6 @@ import shutil
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any, NoReturn
 
 import numpy as np
@@ -57,22 +56,17 @@ def _score(score: Callable[[CurvePoint], float], point: CurvePoint) -> tuple[Cur
 def _spread(
     setup: TeachingSetup, work: Callable[[CurvePoint], Any], points: Sequence[CurvePoint], jobs: int
 ) -> Iterator[Iterator[Any]]:
-    """Do the points, in processes that a limit may end where there is one."""
-    with _traces(setup.cache.folder / TRACES) as folder:
-        traced = TracedTask(work, folder)
-        rescue = Rescue[CurvePoint, Any](_Loss(setup.timeout_s, traced), isolated=setup.timeout_s is not None)
-        with working(traced, points, jobs, rescue=rescue) as done:
-            yield done
-
-
-@contextmanager
-def _traces(folder: Path) -> Iterator[Path]:
-    """An empty folder for the points' traces, where there is room for one; a killed command may have left its own."""
+    """Do the points, in processes that a limit may end where there is one, with traces where there is room for them."""
+    folder = setup.cache.folder / TRACES
+    # A killed command may have left its own.
     shutil.rmtree(folder, ignore_errors=True)
     with suppress(OSError):
         folder.mkdir(parents=True)
+    traced = TracedTask(work, folder)
+    rescue = Rescue[CurvePoint, Any](_Loss(setup.timeout_s, traced), isolated=setup.timeout_s is not None)
     try:
-        yield folder
+        with working(traced, points, jobs, rescue=rescue) as done:
+            yield done
     finally:
         shutil.rmtree(folder, ignore_errors=True)
 

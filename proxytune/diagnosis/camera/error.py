@@ -186,11 +186,9 @@ def compare_brightness(
 
 
 def grey_differences(measured: Pictures, drawn: Pictures, floor: Flags, *, fixed_exposure: bool) -> Pictures:
-    """Absolute differences on the floor (n, floor pixels, 3) of pictures (n, rows, columns, 3) [grey levels].
-
-    Where exposure is not fixed, each is compared at its own brightness, which no model knows.
-    """
+    """Absolute differences on the floor (n, floor pixels, 3) of pictures (n, rows, columns, 3) [grey levels]."""
     measured, drawn = measured[:, floor], drawn[:, floor]
+    # Each is compared at its own brightness, which no model knows.
     if not fixed_exposure:
         ratios = measured.mean(axis=-1) / np.maximum(drawn.mean(axis=-1), 1.0)
         drawn = drawn * np.asarray(np.median(ratios, axis=1)[:, None, None], dtype=np.float32)

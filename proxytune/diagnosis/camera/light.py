@@ -289,10 +289,7 @@ def _against_usual(contrast: Singles) -> Singles:
 def _contrast(
     measured: Pictures, predicted: NDArray[Any], floor: Flags, light: Light, fewest: int = FEWEST_FRAMES
 ) -> tuple[Singles, Singles, Singles]:
-    """Regress the measured brightness of each window on the expected one over the frames; NaN if unknown.
-
-    Gives slopes, their standard errors, and the standard deviations of the measured over those of the expected.
-    """
+    """Slopes of measured on expected brightness of all windows, their errors, ratios of deviations; NaN if unknown."""
     green = np.ascontiguousarray(predicted[..., 1], dtype=np.float32)
     level = light.levels.astype(np.float32)[:, None, None]
     expected, logged = (

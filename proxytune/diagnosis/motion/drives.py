@@ -25,10 +25,8 @@ from proxytune.settings import GEOMETRY, nearest
 
 
 def cosine_and_sine(angle: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
-    """The cosine and the sine of angles (…,) [rad].
-
-    Both come from the tangent of half the angle: of that numpy has a fast form on many processors, of them none.
-    """
+    """The cosine and the sine of angles (…,) [rad]."""
+    # Of the tangent numpy has a fast form on many processors, of cosine and sine none.
     tangent = np.tan(0.5 * angle)
     square = tangent * tangent
     share = 1.0 / (1.0 + square)
@@ -321,10 +319,7 @@ def relative(origin: Floats, pose: Floats) -> Floats:
 
 
 def gather(log: Log, robot: Robot, episodes: Sequence[LogEpisode], *, compared: bool = True) -> Drives:
-    """A batch of a log's episodes, each command held from its own time; `compared` ones need measured motion.
-
-    Poses that lie off the way for a sample or two are left out.
-    """
+    """A batch of a log's episodes without poses that lie off the way for a sample or two; `compared` ones must move."""
     episodes = [without_outliers(episode) for episode in episodes]
     # A measured rate of 59.9998 Hz is 60 Hz: twice the ticks would tell nothing more. Published results of robots on
     # two wheels were got without slack, and stay what they are.

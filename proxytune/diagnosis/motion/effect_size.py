@@ -86,10 +86,7 @@ def drop_negligible(found: Findings, seed: int, aside: Drives | None = None) -> 
 def measure_effect_sizes(
     model: Fit, tested: Drives | None, variant: Variant, effects: Iterable[AdoptedEffect], seed: int
 ) -> list[EffectSize]:
-    """Measure the error without each effect by the error with all, on drives that nothing was fitted to.
-
-    Without such drives it is measured on those that were fitted, with blocks left out in turn.
-    """
+    """Measure the error without each effect by that with all, on other drives, else with blocks left out in turn."""
     drives, rate_hz = model.drives if tested is None else tested, model.drives.rate_hz
 
     def squares(one: Variant) -> dict[float, Floats]:
@@ -116,15 +113,12 @@ def _squares(model: Fit, tested: Drives, variant: Variant) -> dict[float, Floats
 
 
 def _held_out(model: Fit, variant: Variant) -> tuple[Theta | None, dict[float, Floats]]:
-    """Squared held-out errors of a variant of a model that is fitted to windows, by horizon [s].
-
-    The many parameters of a car wander when they are fitted to windows. Where its θ that is fitted to single steps
-    predicts better, that is given too, with its errors.
-    """
+    """Squared held-out errors of a variant fitted to windows, by horizon [s]; of steps with their θ where better."""
     drives, length = model.drives, _length(model.drives)
     windows = multistep_fit.held_out_squares(drives, variant.theta, variant.free, length)
     if drives.robot.drive != "ackermann" or not windows:
         return None, windows
+    # The many parameters of a car wander when they are fitted to windows.
     theta = fit(drives, variant.theta, variant.free, model.noise).theta
     steps = multistep_fit.squared_errors(drives, theta)
     return (theta, steps) if steps[length].mean() < windows[length].mean() else (None, windows)
@@ -136,10 +130,7 @@ def _length(drives: Drives) -> float:
 
 
 def _size_of_draws(drives: Drives, variant: Variant, whole: Mapping[float, Floats], seed: int) -> dict[float, Ratio]:
-    """The size of a random effect: how much of the error its draws make up.
-
-    What is left cannot be below what the noise of poses makes alone: draws that would leave less are not in the data.
-    """
+    """The size of a random effect: how much of the error its draws make up."""
     found, noise = {}, multistep_fit.pose_noise(drives, variant.theta)
     for horizon, squares in whole.items():
         windows = cut(drives, horizon)
@@ -148,6 +139,7 @@ def _size_of_draws(drives: Drives, variant: Variant, whole: Mapping[float, Float
         error = rmse(squares, blocks)
         sizes = []
         for drawn, most in zip((share.value, *share.interval), (error.value, *error.interval), strict=True):
+            # Draws that would leave less than what the noise of poses makes alone are not in the data.
             room = float(np.sqrt(max(0.0, 1.0 - (floor / most) ** 2))) if most > 0.0 else 0.0
             sizes.append(float(1.0 / np.sqrt(1.0 - min(min(drawn, room), LARGEST_SHARE) ** 2)))
         found[horizon] = Ratio(sizes[0], (sizes[1], sizes[2]))
@@ -204,10 +196,7 @@ class RobotClusters(NamedTuple):
 
 
 def find_robot_clusters(drives: Drives, model: Fit) -> RobotClusters | None:
-    """Find the two groups that drives fall in by a wheel's gain, None where they are all alike.
-
-    Effects of one robot that a model lacks spread the drives' gains too, but do not leave a gap between two groups.
-    """
+    """Find the two groups that drives fall in by a wheel's gain, None where they are all alike."""
     episodes = np.unique(drives.episode)
     if len(episodes) < 2 * drives.rules.robot_drives:
         return None
@@ -215,6 +204,7 @@ def find_robot_clusters(drives: Drives, model: Fit) -> RobotClusters | None:
     gains, deviations = np.concatenate([_own_gains(drives.some(batch), model) for batch in batches], axis=1)
     found = [_groups(episodes, gains[:, side], deviations[:, side], drives.rules) for side in range(2)]
     clearest, side = max(((clear, side) for side, (clear, _) in enumerate(found)), key=lambda pair: pair[0])
+    # Effects of one robot that a model lacks spread the gains too, but leave no gap between two groups.
     if clearest < 1.0:
         return None
     groups = found[side][1]

@@ -343,10 +343,7 @@ def window_paths(drives: Drives, theta: Theta, begin: Whole, length: int) -> Flo
 
 
 def window_twists(drives: Drives, theta: Theta, begin: Whole, length: int, added: Floats | None = None) -> Floats:
-    """The motion that a model asks of the plant in such windows (W, length, 3): [m/s], [m/s], [rad/s].
-
-    Something may be added to the commands that arrive (E, T, 2).
-    """
+    """The motion asked of the plant in such windows (W, length, 3), with what is `added` to commands (E, T, 2)."""
     train, _ = _model(drives, theta)
     whole, wheels = _window_wheels(drives, theta, begin, length, added)
     if not train.motion.effects:

@@ -193,15 +193,13 @@ def _misfit(found: Reaction) -> float:
 
 
 def squares_by_latency(drives: Drives, speeds: Speeds, robot: Reaction, latencies: Floats, ends: Whole) -> Floats:
-    """Squares that this reaction leaves of each span at each latency (M, latencies), in its own variances.
-
-    Where the commands had ended, at tick `ends` (E,), nothing speaks for or against a latency.
-    """
+    """Squares that this reaction leaves of each span at each latency (M, latencies), up to the ticks `ends` (E,)."""
     commanded = _CommandedSpeeds(drives, float(np.abs(latencies).max()))
     asked = commanded.speeds(speeds, [robot.latency_s, *latencies.tolist()], robot.time_constant_s)
     usual = _squares(speeds, robot, asked[0])
     left = np.empty((len(speeds.episode), len(latencies)))
     for number, latency in enumerate(latencies):
+        # Where the commands had ended, nothing speaks for or against a latency.
         known = speeds.last - latency * drives.tick_hz <= ends[speeds.episode]
         left[:, number] = np.where(known, _squares(speeds, robot, asked[number + 1]), usual)
     return left
@@ -364,11 +362,9 @@ class Step(NamedTuple):
 
 
 def _steps(log: Log) -> list[list[Step]]:
-    """The clearest step of each block of each drive: a clock that jumps puts moving poses on or back between samples.
-
-    The way round it is a parabola over time; the step is as long as a jump's where way and turn have the same one.
-    """
+    """The clearest step of each drive's blocks: a clock that jumps puts moving poses on or back between samples."""
     count = max(3, round(STEP_SPAN_S * log.rate_hz))
+    # The way round a step is a parabola over time; a jump's step is as long in way and turn.
     at = np.arange(1 - count, count + 1) - 0.5
     parabola = np.linalg.pinv(np.stack((np.ones(2 * count), at, at**2, at > 0.0), axis=1))
     # From ways by samples to the increments between them.
@@ -451,13 +447,11 @@ def _jump_at_a_step(drive: Blocks, latencies: Floats, steps: Sequence[Step], usu
 
 
 def _all_jumps(squares: Floats, latencies: Floats, usual: float | None) -> list[tuple[int, float]]:
-    """The jumps of a drive; small ones alone where none is found among all.
-
-    What a robot does in its last seconds may look like something that it did long before.
-    """
+    """The jumps of a drive; small ones alone where none is found among all."""
     found = _jumps(squares, latencies, MOST_JUMPS, usual)
     if found or not len(squares):
         return found
+    # What a robot does in its last seconds may look like something that it did long before.
     near = np.abs(latencies - latencies[int(squares.sum(axis=0).argmin())]) < FAR_S
     return _jumps(squares[:, near], latencies[near], MOST_JUMPS, usual)
 
@@ -504,12 +498,10 @@ def _is_jump(one: Latency, other: Latency, share: float, usual: float | None, *,
 
 
 def _share(squares: Floats, latencies: Floats, elsewhere: float) -> float:
-    """The share of what is left over at another latency that the best one takes away.
-
-    Far off, one block alone is no proof: a tracker may put its map right within it.
-    """
+    """The share of what is left over at another latency that the best one takes away."""
     best, other = int(squares.sum(axis=0).argmin()), int(np.abs(latencies - elsewhere).argmin())
     gained = squares[:, other] - squares[:, best]
+    # Far off, one block alone is no proof: a tracker may put its map right within it.
     kept = np.ones(len(squares), dtype=bool)
     kept[gained.argmax()] = abs(latencies[best] - elsewhere) < FAR_S
     return float(gained[kept].sum() / max(squares[kept, other].sum(), LEAST_SQUARES * kept.sum()))

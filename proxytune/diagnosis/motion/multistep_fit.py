@@ -139,10 +139,7 @@ def _problem(drives: Drives, theta: Theta, free: tuple[Coordinate, ...], windows
 
 
 def held_out_squares(drives: Drives, theta: Theta, free: Sequence[Coordinate], fitted_s: float) -> dict[float, Floats]:
-    """Predict every compared pose, by horizon [s]: its squared distance from the measured one [m²].
-
-    No pose is predicted by what was fitted to its own fold.
-    """
+    """Squared distances of compared poses from measured ones [m²], by horizon [s], as fitted to other folds alone."""
     fold = np.asarray(drives.block % min(FOLDS, int(drives.block.max()) + 1))
     windows = cut(drives, fitted_s)
     asked = {horizon: cut(drives, horizon) for horizon in horizons(drives)}
@@ -258,10 +255,8 @@ def _mean_square(rows: Floats) -> float:
 
 
 def noise_floor(drives: Drives, windows: Windows, noise: PoseNoise) -> tuple[float, float]:
-    """The error that the noise of poses alone makes over windows: RMSE of position [m] and heading [rad].
-
-    Both ends of a motion are measured, each with noise in x and y; the heading at its beginning turns all of it.
-    """
+    """The error that the noise of poses alone makes over windows: RMSE of position [m] and heading [rad]."""
+    # Both ends of a motion are measured, each in x and y; the heading at its beginning turns all of it.
     chords = np.square(measured_motion(drives, windows)[:, :2]).sum(axis=1).mean()
     place = 4.0 * noise.place**2 + noise.turn**2 * chords
     return float(np.sqrt(place)), float(np.sqrt(2.0) * noise.turn)
@@ -273,10 +268,7 @@ def has_body(drives: Drives) -> bool:
 
 
 def bullet_pose_errors(drives: Drives, theta: Theta, windows: Windows) -> Floats:
-    """Measure the errors of the bullet plant's poses (M, 2): distance [m], heading [rad].
-
-    Each episode is driven in one go from its first command; windows compare the motion since their beginning.
-    """
+    """Measure errors of the bullet plant's poses (M, 2): distance [m], heading [rad]; episodes are driven in one go."""
     twists = twists_of(drives, theta)
     walked = np.zeros((len(twists), twists.shape[1] + 1, 3))
     for episode in np.unique(drives.episode):

@@ -390,10 +390,7 @@ def slopes_of(drives: Drives, theta: Theta, offered: Learnt, free: Sequence[inno
 def _pose_slopes(
     twists: Floats, walked: Floats, features: Iterable[innovations.LearntMotion], at: tuple[Whole, Whole], tick_s: float
 ) -> Floats:
-    """Change of compared poses (M, 3, weights) per weight of the curves, to first order; places as complex numbers.
-
-    `at` is the window and tick of each pose.
-    """
+    """Change of poses `at` windows and ticks (M, 3, weights) per weight, to first order; places as complex numbers."""
     poses = innovations.integrate_twists(twists, tick_s)
     cosine, sine = cosine_and_sine(poses[:, 1:, 2] - twists[..., 2] * (tick_s / 2.0))
     axle = 0.5 * (poses[:, 1:] + poses[:, :-1])
@@ -466,11 +463,7 @@ def compare_repeats(drives: Drives, theta: Theta, horizon_s: float) -> Repeated 
 
 
 def _label_repeats(drives: Drives, windows: Windows) -> tuple[Whole, Whole]:
-    """Label each compared pose by what it repeats (M,), and count how often each of those was driven.
-
-    A pose is a repeat if its window began at the same time and all commands before it were the same, not all zero, and
-    the drive began as fast.
-    """
+    """Label compared poses (M,), alike where time, all commands and start were the same; count how often each is."""
     begin, end = drives.first[windows.begin][windows.window], drives.last[windows.increment]
     # A number for all commands up to each tick: equal ones have the same, and no commands have 0.
     rounded = np.round(drives.duties / ALIKE).astype(np.int64)

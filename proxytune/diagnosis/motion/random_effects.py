@@ -143,11 +143,9 @@ def _ratios(late: Lateness, gradient: Floats, energy: Floats) -> Floats:
 
 
 def responses(fitted: Fit, others: Floats) -> Responses:
-    """Replay the drives with each command lost, and see what changes, and what would of other innovations.
-
-    Commands far apart are lost together, so that one replay tells of many.
-    """
+    """Replay the drives with each command lost, and see what changes, and what would of other innovations."""
     drives = fitted.drives
+    # Commands far apart are lost together, so that one replay tells of many.
     changed, phase = _changed_commands(drives)
     values = np.concatenate((fitted.innovations[:, None], others), axis=1)
     heard = values, values**2
@@ -160,12 +158,10 @@ def responses(fitted: Fit, others: Floats) -> Responses:
 
 
 def _changed_commands(drives: Drives) -> tuple[Whole, Whole]:
-    """Episode and tick of every command that differs from the one before it (C, 2), and its phase (C,).
-
-    Those of one phase are at least MEMORY_S apart: of commands closer together than usual the first counts.
-    """
+    """Episode and tick of commands unlike the one before (C, 2), and phases (C,), within which MEMORY_S apart."""
     before = np.concatenate((drives.rest[:, None], drives.duties[:, :-1]), axis=1)
     found = np.argwhere(drives.issued & np.any(np.abs(drives.duties - before) > 1e-9, axis=-1))
+    # Of commands closer together than usual the first counts.
     number = np.floor(found[:, 1] * drives.rate_hz / drives.tick_hz + 1e-6).astype(int)
     _, first = np.unique(found[:, 0] * (number.max(initial=0) + 1) + number, return_index=True)
     return found[first], number[first] % math.ceil(MEMORY_S * drives.rate_hz)

@@ -51,10 +51,7 @@ def check_camera(loop: Loop) -> None:
 
 
 def diagnose_target(loop: Loop, source: Path, folder: Path, teller: Teller) -> None:
-    """Diagnose a log, and write what `diagnose` does: diagnosis.json, model.toml and figures.
-
-    What is declared is all that the study's box and its proxy have.
-    """
+    """Diagnose a log, and write what `diagnose` does: diagnosis.json, model.toml and figures."""
     with open_log(source, facts=loop.facts) as (log, notes):
         for note in notes:
             teller.say(note)
@@ -109,10 +106,7 @@ A_FOLDER_OF_ITS_OWN = (FILE_NAME, "log.toml")
 
 
 def extension_text(settings: StudySettings, model: Path, folder: Path) -> str:
-    """The study.toml of the extended study in this folder: as the study's own, but for its proxy and its paths.
-
-    What the study's own proxy has beside what was diagnosed stays, as [domain.effects].
-    """
+    """The study.toml of the extended study in this folder: as the study's own, but for its proxy and its paths."""
     values = dict(read_settings(settings.path).values)
     values |= {"name": f"{settings.name}_extended", "proxy": _from(folder, model)}
     targets = [_from(folder, path) for path in settings.targets]
@@ -121,6 +115,7 @@ def extension_text(settings: StudySettings, model: Path, folder: Path) -> str:
         values["truth"] = _from(folder, settings.truth)
     domain = {key: value for key, value in settings.domain.items() if key != "effects"}
     found = read_settings(model).section("effects").keys()
+    # What the study's own proxy has beside what was diagnosed stays.
     proxy = read_settings(settings.proxy).section("effects").values if settings.proxy else {}
     own = settings.domain.section("effects").values
     kept = {name: {**proxy.get(name, {}), **own.get(name, {})} for name in {**proxy, **own} if name not in found}

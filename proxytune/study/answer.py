@@ -283,12 +283,10 @@ def _learn_again(run: StudyRun, learnt: Knowledge, driven: Sequence[Finalist]) -
 
 
 def _answer(driven: Sequence[Finalist], learnt: Knowledge, again: Knowledge) -> Finalist:
-    """The mean, or the most probable, of those that PRPV cannot tell from the best; the best where no θ explains it.
-
-    Each has as many fresh episodes, so what fresh noise does to all of them alike favours none.
-    """
+    """The mean, or the most probable, of those that PRPV cannot tell from the best; the best where no θ explains it."""
     by_values = {learnt.space.values(one.trial.theta): one for one in driven}
     own = learnt.expected_of({values: one.trial.score or 0.0 for values, one in by_values.items()})
+    # Each has as many fresh episodes, so what fresh noise does to all of them alike favours none.
     fresh = {values: [score for score in one.scores if score is not None] for values, one in by_values.items()}
     expected = {values: float(np.mean([own[values], *scores])) for values, scores in fresh.items()}
     best = min(expected, key=expected.__getitem__)

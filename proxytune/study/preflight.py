@@ -278,11 +278,9 @@ def _plan(settings: StudySettings, places: Sequence[Place], undecided: Sequence[
 
 
 def _group(settings: StudySettings, agent: str, place: Place, moved: Sequence[Interval]) -> list[Episode]:
-    """The base with a new seed, to measure the noise, the base, and each parameter that is moved at its two ends.
-
-    The new seed is the agent's own: agents that shared it would share one draw of the noise.
-    """
+    """The base with a new seed, to measure the noise, the base, and each parameter that is moved at its two ends."""
     base = centre_of(settings)
+    # The agent's own: agents that shared it would share one draw of the noise.
     seed = preflight_noise_seed(settings.seed, *place, sorted(settings.agents).index(agent))
     again = make_episode(base, agent=agent, start=place.start, seed=seed)
     instances = [base, *({**base, i.name: end} for i in moved for end in (i.low, i.high))]
@@ -346,10 +344,7 @@ def noise_of(run: StudyRun) -> NoiseVariance:
 
 
 def placement_variance(run: StudyRun) -> Floats | None:
-    """Variance of an episode's metrics by its placement alone (agents, metrics), as the target has them.
-
-    By the pre-flight, or as the table of a bank has it; None where neither tells.
-    """
+    """Variance of metrics by placement alone (agents, metrics), by pre-flight or a bank's table; None without."""
     pairs, table = placement_pairs(run), run.study.target
     if pairs.size:
         return _shrunk((pairs[:, 0] - pairs[:, 1]) ** 2) / 2.0

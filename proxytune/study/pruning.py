@@ -124,10 +124,7 @@ def rescored_pruned(run: StudyRun, trial: TrialRecord) -> TrialRecord:
 
 
 def spared(run: StudyRun, trials: Sequence[TrialRecord]) -> tuple[int, float]:
-    """Count the episodes that pruned trials did without, and how long their like take [s], by the others' mean time.
-
-    Those that other processes had begun in vain are not among them.
-    """
+    """Count the episodes that pruned trials did without, none begun in vain, and the mean seconds of their like."""
     settings, seconds = run.settings, run.store.seconds()
     planned = [
         episode for trial in trials if trial.decided for episode in plan_episodes(settings, trial.theta, settings.seed)
@@ -147,16 +144,14 @@ def _decided(study: Study, rule: PruningRule, plan: Plan, known: Mapping[Episode
 def _pruned_at(
     study: Study, rule: PruningRule, plan: Plan, known: Mapping[Episode, Outcome], count: int
 ) -> TrialRecord | None:
-    """The trial as it was stopped, where the first so many agents are enough to prune it; else None.
-
-    PRPV of the pairs decided is a bound; what is expected of all pairs is its score.
-    """
+    """The trial as it was stopped, where the first so many agents are enough to prune it; else None."""
     trial, planned = plan
     names, driven = rule.order[:count], [known[episode] for episode in planned[: count * study.settings.starts]]
     worked = [outcome for outcome in driven if outcome.metrics]
     if {outcome.episode.agent for outcome in worked} != set(names):
         # An agent that failed from every start leaves the trial without a score, not with a bad one.
         return None
+    # PRPV of the pairs decided is a bound; what is expected of all pairs is its score.
     bound = float(disagreement_of(study, score_table(worked), names).sum())
     share = rule.disagreement[:count, :count].sum() / rule.disagreement.sum()
     failed, score = len(driven) - len(worked), float(bound / share)

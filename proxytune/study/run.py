@@ -36,16 +36,14 @@ class AfterEarlier:
 
 
 def retry_failed(run: StudyRun) -> None:
-    """Drive failed episodes of ended trials again where the user's code has changed since, and score these trials anew.
-
-    Such a trial is driven in full, also if it was pruned before. θ of later trials stay what they are.
-    """
+    """Drive failed episodes of ended trials again where the user's code has changed since; score these trials anew."""
     for trial in run.finished_trials():
         if trial.failed_episodes:
             known = run.known(run.episodes_of(trial))
             failed = [episode for episode, outcome in known.items() if outcome.metrics is None]
             # Where fewer have failed than the trial says, they were tried again before this process.
             if len(failed) != trial.failed_episodes or any(episode in run.corrected for episode in failed):
+                # In full, also if it was pruned before; θ of later trials stay what they are.
                 planned = plan_episodes(run.settings, trial.theta, run.settings.seed)
                 run.outcomes(planned, f"trial {trial.number} again")
                 run.save_trials(record(trial.number, run.evaluation_of(trial)))

@@ -40,10 +40,8 @@ def prepare_points(setup: TeachingSetup, points: Sequence[CurvePoint], jobs: int
 def score_points(
     setup: TeachingSetup, points: Sequence[CurvePoint], jobs: int
 ) -> AbstractContextManager[Iterator[tuple[CurvePoint, float]]]:
-    """Score the points in parallel, each yielded as soon as it is there.
-
-    Those that take longest begin first: otherwise one of them, begun last, would keep one process busy alone.
-    """
+    """Score the points in parallel, each yielded as soon as it is there."""
+    # Otherwise one of those that take longest, begun last, would keep one process busy alone.
     ordered = sorted(points, key=lambda point: -point.count)
     return _spread(setup, functools.partial(_score, setup.score), ordered, jobs)
 
@@ -135,10 +133,7 @@ def examine_curves(
     watcher: Watcher,
     known: learning.ExaminationScores | None = None,
 ) -> dict[learning.Examination, float]:
-    """Examine learners of these proxies, None of the one without; what is cached is not made again.
-
-    The known scores, of learners that are not examined further, are given back with the new ones.
-    """
+    """Examine learners of these proxies, None of the one without, if that is not cached; `known` scores come along."""
     taught, scores = setup.settings, dict(known or {})
     if taught.examinations is None:
         every = itertools.product(proxies, range(taught.seeds), taught.target_samples)

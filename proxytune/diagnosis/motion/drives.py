@@ -157,12 +157,6 @@ def commands_of(log: Log, robot: Robot, episode: LogEpisode, ticks: int) -> Comm
     return Commands(times, duties, duties[before[-1]] if len(before) and episode.wheels is None else rest, 0)
 
 
-def commands_a_second(log: Log, episodes: Sequence[LogEpisode]) -> float:
-    """Commands a second: one a sample, or one at the usual interval between their own times."""
-    between = [np.diff(e.issued) for e in episodes if e.issued is not None and len(e.issued) > 1]
-    return 1.0 / float(np.median(np.concatenate(between))) if between else log.rate_hz
-
-
 Whole = NDArray[Any]
 
 
@@ -334,11 +328,13 @@ def gather(log: Log, robot: Robot, episodes: Sequence[LogEpisode], *, compared: 
     if compared and len(rows) == 0:
         raise LogError(f"{log.name}: no two measured poses in a row; nothing can be learnt from it")
     poses, after = ends_of(episodes, samples)
+    # Commands come with the samples, or at times of their own.
+    between = [np.diff(e.issued) for e in episodes if e.issued is not None and len(e.issued) > 1]
     linked = np.concatenate(([False], (number[1:] == number[:-1]) & (rows[1:, 0] == rows[:-1, 1])))[: len(rows)]
     drives = Drives(
         robot=robot,
         tick_hz=tick_hz,
-        rate_hz=commands_a_second(log, episodes),
+        rate_hz=1.0 / float(np.median(np.concatenate(between))) if between else log.rate_hz,
         duties=np.stack([one.over_ticks(length, tick_hz) for one in given]),
         issued=np.stack([one.ticks(length, tick_hz) for one in given]),
         rest=np.stack([_at_start(one, e, s, robot) for one, e, s in zip(given, episodes, samples, strict=True)]),

@@ -337,14 +337,11 @@ def _rivals(best: FittedCandidate, chosen: ScreenedCandidate, evidence: Evidence
             other.gain > best.gain - rules.rival_nats
             or (other.gain >= rules.rival_share * best.gain and predicts_no_worse(other.fitted, best.fitted))
         )
-        if one.candidate.effect != chosen.candidate.effect and (close or _cosine(one, chosen) > rules.rival_cosine):
+        size = float(np.linalg.norm(one.column) * np.linalg.norm(chosen.column))
+        alike = size > 0.0 and float(one.column @ chosen.column) / size > rules.rival_cosine
+        if one.candidate.effect != chosen.candidate.effect and (close or alike):
             rivals.setdefault(one.candidate.effect, one.candidate)
     return tuple(rivals.values())
-
-
-def _cosine(one: ScreenedCandidate, other: ScreenedCandidate) -> float:
-    size = float(np.linalg.norm(one.column) * np.linalg.norm(other.column))
-    return float(one.column @ other.column) / size if size > 0.0 else 0.0
 
 
 def drop_idle(model: Fit, adopted: Sequence[AdoptedEffect]) -> tuple[Fit, list[AdoptedEffect]]:

@@ -84,16 +84,13 @@ def held_out_settings(
 def drive_held_out(
     opened: study.Study, settings: study.StudySettings, theta: Theta, watcher: Watcher
 ) -> tuple[Assessment, int]:
-    """Drive held-out agents in the instance of a study's family, twice from each start, and assess it.
-
-    Episodes are kept in the study's own database, and those that are there are not driven again. The second time is for
-    the noise floor: what the instance scores against itself. Gives the assessment, and how many were driven now.
-    """
+    """Drive held-out agents in an instance, twice from each start: its assessment, and the episodes driven now."""
     held = replace(opened, settings=settings, target=study.read_target(settings, opened.family)[0])
     seeds = [fresh_seed(settings.seed, repetition) for repetition in (1, 2)]
     with locked(opened.settings.folder), Store.open(opened.settings.folder) as store:
         run = study.StudyRun(held, store, watcher)
         once, again = (_scores(run, study.plan_episodes(settings, theta, seed)) for seed in seeds)
+    # The second time is for the noise floor: what the instance scores against itself.
     floor = floor_of_repeats(domain=once, again=again, metrics=settings.metrics)
     return assess(proxy=once, target=held.target, metrics=settings.metrics, floor=floor), run.spent.episodes
 

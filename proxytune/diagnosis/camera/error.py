@@ -40,15 +40,13 @@ class PictureError:
 
 
 def unseen_residuals(views: Views, state: State, names: Sequence[str]) -> Floats:
-    """Residuals of every edge point (n,) [pixel], by cameras that were fitted without its frame.
-
-    Poses of frames left out are fitted under the tracker's scatter. CAP_PX where no marking is near.
-    """
+    """Residuals of every edge point (n,) [pixel], by cameras that were fitted without its frame."""
     residuals = np.full(len(views.edges.row), CAP_PX)
     for fold in range(FOLDS):
         out = np.arange(views.count) % FOLDS == fold
         fit = fit_camera(views, state, names, SCALES, ~out)
         own = out[views.edges.frame]
+        # Poses of frames left out are fitted under the tracker's scatter.
         there = project(views, fit_poses(views, fit.state, out))
         residuals[own] = np.where(there.valid, np.clip(there.residual, -CAP_PX, CAP_PX), CAP_PX)[own]
     return residuals

@@ -209,10 +209,7 @@ class Diagnosis:
         }
 
     def at_edge(self, effect: AdoptedEffect) -> tuple[str, ...]:
-        """Parameters of an effect, by name in θ, that were fitted to an end of their range which is not neutral.
-
-        The effect then stands for something else.
-        """
+        """Names in θ of an effect's values at an end that is not neutral: the effect then stands for something else."""
         return _at_edge({name: one.value for name, one in self.theta.items()}, effect, self.found.model.drives)
 
     @property

@@ -58,17 +58,14 @@ class WeighedEffect(NamedTuple):
 
 
 def drop_negligible(found: Findings, seed: int, aside: Drives | None = None) -> Findings:
-    """Drop the effects that are negligible for prediction, the weakest first.
-
-    On drives kept aside what is not shown to be worth anything is dropped. Without them effects are weighed on the
-    fitted drives, and have to be material.
-    """
+    """Drop the effects that are negligible for prediction, the weakest first."""
     drives = found.model.drives
     variant, kept = Variant(found.model.theta, found.model.free), list(found.adopted)
     dropped: list[DroppedEffect] = []
     while kept and multistep_fit.horizons(drives) and (aside is None or multistep_fit.horizons(aside)):
         sizes = measure_effect_sizes(found.model, aside, variant, kept, seed)
         weighed = [WeighedEffect(effect, size, drives.rules) for effect, size in zip(kept, sizes, strict=True)]
+        # On drives kept aside anything that is shown will do; on those that were fitted effects have to be material.
         worth = [one.material if aside is None else any(size.above for size in one.size.values()) for one in weighed]
         negligible = [one for one, needed in zip(weighed, worth, strict=True) if not needed]
         weakest = min(negligible, key=lambda one: max(size.value for size in one.size.values()), default=None)

@@ -166,17 +166,14 @@ def _by_numba() -> ModuleType | None:
 
 
 def fit_noise(drives: Drives, errors: Floats, start: Noise) -> Noise:
-    """The noise under which errors (N, 3) are likeliest, looked for from `start` and from FIRST_GUESS.
-
-    A start from a model that misses much can end where all noise is too large. Of long drives a part is taken, the same
-    for every model.
-    """
+    """The noise under which errors (N, 3) are likeliest, looked for from `start` and from FIRST_GUESS."""
     # Multiples of the golden ratio spread runs evenly whatever their number, in step with nothing that drives repeat.
     number = np.arange(len(errors)) // RUN
     kept = np.asarray(number * 0.6180339887 % 1.0 < THINNED / max(len(errors), 1))
     if not kept.all():
         drives, errors = drives.only(kept), errors[kept]
     parts = np.stack([_covariance(drives, unit) for unit in np.eye(5)])
+    # A start from a model that misses much can end where all noise is too large.
     found = [_fit_noise(parts, errors, noise) for noise in dict.fromkeys((start, FIRST_GUESS))]
     return min(found, key=lambda pair: pair[0])[1]
 

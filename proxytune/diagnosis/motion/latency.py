@@ -211,15 +211,12 @@ def _squares(speeds: Speeds, robot: Reaction, asked: Floats) -> Floats:
 
 
 def likeliest_latency(squares: Floats, latencies: Floats) -> Latency:
-    """The latency at which squares summed over blocks (blocks, latencies) are least.
-
-    Its deviation is that of the blocks' slopes there over the curvature; infinite where nothing tells it, as at either
-    end: a robot that is stuck is as if its commands came long after.
-    """
+    """The latency at which squares summed over blocks (blocks, latencies) are least."""
     total = squares.sum(axis=0)
     least = int(total.argmin())
     middle = int(np.clip(least, 1, len(total) - 2))
     curve = float(total[middle - 1] - 2.0 * total[middle] + total[middle + 1])
+    # Nothing tells it, as at either end: a robot that is stuck is as if its commands came long after.
     if curve <= 0.0 or least != middle:
         return Latency(float(latencies[middle]), float("inf"))
     slopes = (squares[:, middle + 1] - squares[:, middle - 1]) / 2.0
@@ -295,12 +292,7 @@ class Drift(NamedTuple):
 
 
 def clock_drift(blocks: Blocks, times: Floats, latencies: Floats) -> Drift | None:
-    """The rate at which latency grows over a log, one for all its drives; None where nothing tells it.
-
-    A grid of rates is looked through, and Gauss-Newton steps lead on from its best. Its deviation is that of the slopes
-    of pieces of the drives: where a part of them alone grows late, their robot or their own clock does.
-    `times` are the middles of the blocks in the log's time (B,) [s].
-    """
+    """The rate at which latency grows over a log, its blocks' middles at `times` (B,) [s]; None where nothing tells."""
     middle, step = times - times.mean(), float(latencies[1] - latencies[0])
     span = float(np.ptp(times))
     if span <= 0.0:
@@ -320,6 +312,7 @@ def clock_drift(blocks: Blocks, times: Floats, latencies: Floats) -> Drift | Non
         slopes = (squares[:, at + 1] - squares[:, at - 1]) / (2.0 * step)
         further = -float(slopes @ middle) / (curve * float(middle @ middle))
         rate += further
+    # Where a part of the drives alone grows late, their robot or their own clock does.
     _, label = np.unique(blocks.episode * len(times) + blocks.number // PIECE, return_inverse=True)
     votes = np.bincount(label, (slopes - slopes.mean() + curve * further * middle) * middle)
     if len(votes) < FEWEST_PIECES:

@@ -210,15 +210,12 @@ class PoseNoise(NamedTuple):
 
 
 def pose_noise(drives: Drives, theta: Theta) -> PoseNoise:
-    """The noise of measured poses, from third differences of the path of what a model leaves over.
-
-    A model's slow errors, and those of a robot that drifts, vanish in third differences or grow with the lag; the noise
-    of a pose does neither. The better the model, the fewer of its errors pass for noise.
-    """
+    """The noise of measured poses, from third differences of the path of what a model leaves over."""
     left = drives.measured - increments(drives, theta)
     heading = drives.poses[:, 0, 2]
     along = (left[:, 0] + 1j * left[:, 1]) * np.exp(1j * heading)
     steps = np.stack((along.real, along.imag, left[:, 2]), axis=1)
+    # A model's slow errors, and a robot's drift, vanish in them or grow with the lag; a pose's noise does neither.
     differences = {lag: _third_differences(drives, steps, lag) for lag in LAGS}
     enough = {lag: rows for lag, rows in differences.items() if len(rows) >= FEWEST}
     return PoseNoise(_white(enough, slice(0, 2)), _white(enough, slice(2, 3)))

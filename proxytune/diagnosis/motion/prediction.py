@@ -436,11 +436,7 @@ class Repeated(NamedTuple):
 
 
 def compare_repeats(drives: Drives, theta: Theta, horizon_s: float) -> Repeated | None:
-    """Compare a model's error with what drives do not repeat; None where too little was driven twice, or was copied.
-
-    Of windows driven n times the mean is taken off, and n/(n − 1) gives back what that takes: for two drives, √(½ mean
-    square of their difference). Each drive of the log is one block: windows of repeats begin together.
-    """
+    """Compare a model's error with what drives do not repeat; None where too little was driven twice, or was copied."""
     windows = cut(drives, horizon_s)
     if len(windows.begin) < FEWEST:
         return None
@@ -457,6 +453,7 @@ def compare_repeats(drives: Drives, theta: Theta, horizon_s: float) -> Repeated 
         # Copies of drives to the last digit: they say nothing of what a robot does not repeat.
         return None
     missed = pose_errors(drives, theta, windows)[:, 0] ** 2
+    # Each drive of the log is one block: windows of repeats begin together.
     first = np.flatnonzero(np.diff(windows.window, prepend=-1))
     share = ratio(apart[kept], missed[kept], label[first][windows.window][kept])
     return Repeated(share, float(np.sqrt(apart[kept].mean())), float(kept.mean()))

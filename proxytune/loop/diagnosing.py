@@ -15,12 +15,10 @@ import tomlkit
 
 from proxytune.api import DiagnosisReport, Wanted, recordable
 from proxytune.diagnosis import camera_effects, diagnose_log, film, forget_stages, motion_effects, robot_of
-from proxytune.driving import Robot
 from proxytune.effects import Catalogue, effect_of
 from proxytune.errors import RunError, SettingsError, StoreError
 from proxytune.extensions import describe
 from proxytune.importing import open_log
-from proxytune.logs import Log
 from proxytune.loop.comparison import NEXT, compare_errors, floor_text, following, lacking, level_text, theta_table
 from proxytune.loop.opening import Loop, Teller
 from proxytune.report import figures_also_as, findings, write_text
@@ -57,19 +55,15 @@ def diagnose_target(loop: Loop, source: Path, folder: Path, teller: Teller) -> N
             teller.say(note)
         robot = robot_of(log, loop.robot, Catalogue(loop.settings.folder.resolve()))
         with teller.diagnosis(log) as report:
-            declared, seed = declared_of(loop, robot, log), loop.settings.seed
+            known, seed = motion_effects(robot.catalogue), loop.settings.seed
+            # What the study declares and this log can be asked for
+            known = known if log.frames is None else (*known, *camera_effects(robot.catalogue))
+            declared = tuple(name for name in declared_names(loop) if name in known)
             found = diagnose_log(log, robot, declared, seed=seed, report=report, folder=folder)
             report("drawing")
             with figures_also_as(("svg",)):
                 DiagnosisReport(found).write(folder)
             forget_stages(folder)
-
-
-def declared_of(loop: Loop, robot: Robot, log: Log) -> tuple[str, ...]:
-    """The effects that the study declares and that this log can be asked for."""
-    known = motion_effects(robot.catalogue)
-    known = known if log.frames is None else (*known, *camera_effects(robot.catalogue))
-    return tuple(name for name in declared_names(loop) if name in known)
 
 
 def read_diagnosis(folder: Path) -> dict[str, Any]:

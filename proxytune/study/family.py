@@ -107,17 +107,12 @@ def _check(settings: StudySettings, family: DomainFamily) -> None:
     for metric in settings.metrics:
         if metric.name not in family.metrics:
             raise settings.error("metrics", f"unknown metric '{metric.name}'; {nearest(metric.name, family.metrics)}")
-    for agent in settings.agents:
-        _check_agent(settings, family, agent)
-
-
-def _check_agent(settings: StudySettings, family: DomainFamily, agent: str) -> None:
-    name = settings.aliases.get(agent, agent)
-    key = f"agents.{agent}" if settings.aliases else "agents"
-    try:
-        ask(f"check_agent('{name}') of {settings.family}", lambda: family.check_agent(name))
-    except InputError as problem:
-        raise settings.error(key, str(problem)) from None
+    for agent, name in zip(settings.agents, settings.loaded_agents, strict=True):
+        try:
+            ask(f"check_agent('{name}') of {settings.family}", functools.partial(family.check_agent, name))
+        except InputError as problem:
+            key = f"agents.{agent}" if settings.aliases else "agents"
+            raise settings.error(key, str(problem)) from None
 
 
 def check_bounds(

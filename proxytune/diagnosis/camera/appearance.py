@@ -66,16 +66,12 @@ WIDEST = (0.06, 0.01)
 
 @dataclass(frozen=True)
 class MovingEdges:
-    """Points on the edges of markings in measured frames (P,), whose `normal` (P, 2) goes from dark to bright.
+    """Points on the edges of markings in measured frames."""
 
-    Places are columns and rows (P, 2) [pixel], 0.5 in the first pixel's middle; `speed` along the normal [pixel/s] is 0
-    in still frames.
-    """
-
-    frame: NDArray[np.intp]
-    place: Floats
-    normal: Floats
-    speed: Floats
+    frame: NDArray[np.intp]  # (P,)
+    place: Floats  # columns and rows (P, 2) [pixel], 0.5 in the first pixel's middle
+    normal: Floats  # from dark to bright (P, 2)
+    speed: Floats  # along the normal (P,) [pixel/s], 0 in still frames
 
 
 @dataclass(frozen=True)

@@ -214,18 +214,14 @@ MATERIAL = 1.03
 
 @dataclass(frozen=True)
 class Weighed:
-    """A camera with those effects alone that matter: errors on unseen frames, before and after.
-
-    `ratios` are the errors without each named effect, dropped ones too, over that with all; `nats` what leaving it out
-    costs; `dropped` had evidence, and hardly change the error.
-    """
+    """A camera with those effects alone that matter."""
 
     named: CameraSelection
     with_dropped: CameraFit
-    pixels: Comparison
-    ratios: Mapping[str, float]
-    nats: Mapping[str, float]
-    dropped: tuple[str, ...]
+    pixels: Comparison  # errors on unseen frames, before and after
+    ratios: Mapping[str, float]  # errors without each named effect, dropped ones too, over that with all
+    nats: Mapping[str, float]  # what leaving each out costs
+    dropped: tuple[str, ...]  # effects that had evidence, and hardly change the error
 
 
 def weigh_effects(named: CameraSelection, seed: int) -> Weighed:

@@ -41,16 +41,13 @@ def count_points(
 
 
 class Marginal(NamedTuple):
-    """Normal equations of the common columns with every frame's pose eliminated: of each its block's inverse (N, 3, 3).
-
-    `coupling` is how poses follow the common columns (N, 3, columns), `own` where they would go by themselves (N, 3).
-    """
+    """Normal equations of the common columns with every frame's pose eliminated."""
 
     matrix: Floats
     right: Floats
-    inverse: Floats
-    coupling: Floats
-    own: Floats
+    inverse: Floats  # of each pose's block (N, 3, 3)
+    coupling: Floats  # how poses follow the common columns (N, 3, columns)
+    own: Floats  # where poses would go by themselves (N, 3)
 
 
 def eliminate_poses(

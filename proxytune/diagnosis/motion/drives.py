@@ -116,15 +116,12 @@ def commands_as(kind: str, robot: Robot, duties: Floats) -> Floats:
 
 
 class Commands(NamedTuple):
-    """An episode's commands (M, 2), as fractions of full speed; times [s] count from the first sample.
+    """An episode's commands (M, 2), as fractions of full speed."""
 
-    `rest` was in force before it; `ticks_each` is how long each lasts where commands go with the samples, else 0.
-    """
-
-    times: Floats
+    times: Floats  # from the first sample on [s]
     duties: Floats
-    rest: Floats
-    ticks_each: int
+    rest: Floats  # what was in force before the first sample
+    ticks_each: int  # how long each lasts where commands go with the samples, else 0
 
     def over_ticks(self, length: int, tick_hz: float) -> Floats:
         """The mean of the command in force over each tick (length, 2); each is held from its own time."""

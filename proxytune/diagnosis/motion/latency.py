@@ -47,17 +47,13 @@ class Speeds(NamedTuple):
 
 
 class Reaction(NamedTuple):
-    """The linear, first-order robot that follows its commands best: what latency lies beyond the motor's lag [s].
+    """The linear, first-order robot that follows its commands best."""
 
-    Gains go from commanded to measured forward speed and yaw rate (2, 2); `spread` is the deviation of what it leaves
-    of either, `squares` what it leaves of each span (M,), in units of the whole log's.
-    """
-
-    latency_s: float
+    latency_s: float  # what latency lies beyond the motor's lag [s]
     time_constant_s: float
-    gains: Floats
-    spread: Floats
-    squares: Floats
+    gains: Floats  # from commanded to measured forward speed and yaw rate (2, 2)
+    spread: Floats  # deviation of what it leaves of either
+    squares: Floats  # what it leaves of each span (M,), in units of the whole log's
 
 
 class Latency(NamedTuple):

@@ -54,14 +54,11 @@ MOST_TRIALS = 20
 
 
 class MultistepFit(NamedTuple):
-    """The result of fitting parameters to windows: held-out error of the new values by the old ones', by horizon.
+    """The result of fitting parameters to windows."""
 
-    What was not fitted to windows has no interval.
-    """
-
-    horizon_s: float
-    ratios: Mapping[float, Ratio]
-    intervals: Mapping[str, tuple[float, float]]
+    horizon_s: float  # length of the windows [s]
+    ratios: Mapping[float, Ratio]  # held-out error of the new values by the old ones', by horizon [s]
+    intervals: Mapping[str, tuple[float, float]]  # of what was fitted to windows, by name in θ
 
 
 def horizons(drives: Drives) -> tuple[float, ...]:

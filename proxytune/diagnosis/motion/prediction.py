@@ -334,13 +334,10 @@ STEP = 5e-3
 
 
 class Slopes(NamedTuple):
-    """Windows' poses (M, 3) as they are compared, in metres: forward, left, and heading times the median way.
-
-    `columns` is the change of the prediction per weight (M, 3, weights), curve by curve, free coordinates last.
-    """
+    """Windows' poses (M, 3) as they are compared, in metres: forward, left, and heading times the median way."""
 
     residuals: Floats
-    columns: Floats
+    columns: Floats  # change of the prediction per weight (M, 3, weights), curve by curve, free coordinates last
     block: Whole
 
 
@@ -424,15 +421,11 @@ ALIKE_AT_START = 0.1
 
 
 class Repeated(NamedTuple):
-    """The scatter of drives from the same commands: what they do not repeat, RMSE of position [m].
+    """The scatter of drives from the same commands: what they do not repeat."""
 
-    Its `share` of the model's error over the same windows is 1 where the model predicts all that repeats; `part` of all
-    windows have repeats.
-    """
-
-    share: Ratio
-    apart: float
-    part: float
+    share: Ratio  # of the model's error over the same windows: 1 where the model predicts all that repeats
+    apart: float  # RMSE of position [m]
+    part: float  # so many of all windows have repeats
 
 
 def compare_repeats(drives: Drives, theta: Theta, horizon_s: float) -> Repeated | None:

@@ -44,30 +44,23 @@ SEEN = 1.0
 
 
 class Responses(NamedTuple):
-    """Responses of the innovations to the loss of single commands, a row per command that changed anything.
+    """Responses of the innovations to the loss of single commands, a row per command that changed anything."""
 
-    `gradient` and `size` are products of the change with the innovations and with itself; `others` the gradient with
-    other innovations (columns, commands).
-    """
-
-    gradient: Floats
-    size: Floats
-    others: Floats
+    gradient: Floats  # product of the change with the innovations
+    size: Floats  # product of the change with itself
+    others: Floats  # gradient with other innovations (columns, commands)
 
 
 class RandomEffect(NamedTuple):
-    """A random effect weighed: its likeliest size, and its gain beyond what chance gives on average [nats].
-
-    The interval is all sizes that are looked for, until `infer_size_indirectly` narrows it. `left` is what the
-    likeliest lateness of every command leaves of its pull on the innovations: about 1 if lateness is all that there is.
-    """
+    """A random effect weighed."""
 
     effect: str
     parameter: str
-    value: float
-    interval: tuple[float, float]
-    gain: float
+    value: float  # its likeliest size
+    interval: tuple[float, float]  # all sizes that are looked for, until `infer_size_indirectly` narrows it
+    gain: float  # beyond what chance gives on average [nats]
     p_value: float
+    # what the likeliest lateness of every command leaves of its pull on the innovations: about 1 if lateness is all
     left: float = 0.0
 
 

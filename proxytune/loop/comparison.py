@@ -22,16 +22,13 @@ Known = Mapping[str, tuple[float, Ends | None]]
 
 @dataclass(frozen=True)
 class Level:
-    """A measure of one proxy, its 95 % interval, and what a perfect proxy and, mean and deviation, chance would have.
-
-    None where something is not known; where only a bracket of the floor is, its ends are.
-    """
+    """A measure of one proxy; None where something is not known."""
 
     value: float
-    interval: Ends | None
-    floor: float | None = None
-    floor_ends: Ends | None = None
-    chance: Ends | None = None
+    interval: Ends | None  # 95 %
+    floor: float | None = None  # what a perfect proxy would have
+    floor_ends: Ends | None = None  # its interval, or a bracket where no more is known of it
+    chance: Ends | None = None  # mean and deviation by chance
 
 
 @dataclass(frozen=True)

@@ -85,16 +85,12 @@ def _attach(run: StudyRun, known: Sequence[Outcome | Theta]) -> None:
 
 @dataclass(frozen=True)
 class Finalist:
-    """A θ that has been driven again: the trial that visited it, or its own episodes as a trial of number UNVISITED.
+    """A θ that has been driven again."""
 
-    `scores` are the study's cost in each fresh repetition, None where an agent has no episode that worked; the
-    assessment, over all fresh episodes, is the answer's alone.
-    """
-
-    trial: TrialRecord
-    fresh: tuple[tuple[Outcome, ...], ...]
-    scores: tuple[float | None, ...]
-    assessment: Assessment | None = None
+    trial: TrialRecord  # the trial that visited it, or its own episodes as a trial of number UNVISITED
+    fresh: tuple[tuple[Outcome, ...], ...]  # outcomes of each fresh repetition
+    scores: tuple[float | None, ...]  # cost in each of these, None where an agent has no episode that worked
+    assessment: Assessment | None = None  # over all fresh episodes, of the answer alone
 
     @property
     def optimism(self) -> float | None:

@@ -311,14 +311,10 @@ UNKNOWN_NOISE = 0.1
 
 @dataclass(frozen=True, eq=False)
 class NoiseVariance:
-    """Variance of the difference of proxy's and target's mean scores at the same θ (agents, metrics).
-
-    The caution says what is lost; empty where both drive from the same starts and a pre-flight told what placement
-    does.
-    """
+    """Variance of the difference of proxy's and target's mean scores at the same θ (agents, metrics)."""
 
     variance: Floats
-    caution: str = ""
+    caution: str = ""  # what is lost; empty where both have the same starts and a pre-flight told what placement does
 
 
 def noise_of(run: StudyRun) -> NoiseVariance:

@@ -33,15 +33,11 @@ PRIOR_DISAGREEMENT = 1e-3
 
 @dataclass(frozen=True)
 class PruningRule:
-    """The limit that the trials of a batch are held against: a function of the trials finished before it.
-
-    Agents are driven in this order, which is that of `disagreement`: mean |α_proxy − α_target| of pairs over scored
-    trials.
-    """
+    """The limit that the trials of a batch are held against: a function of the trials finished before it."""
 
     limit: float
-    order: tuple[str, ...]
-    disagreement: Floats
+    order: tuple[str, ...]  # in which agents are driven
+    disagreement: Floats  # mean |α_proxy − α_target| of pairs of agents, in this order, over scored trials
 
 
 def pruning_rule(run: StudyRun, done: Sequence[TrialRecord]) -> PruningRule | None:

@@ -51,13 +51,10 @@ def texts_of(table: Section) -> dict[str, str]:
 
 @dataclass(frozen=True)
 class StopRules:
-    """The rules that end a study before its budget is spent; None where one is not asked for.
+    """The rules that end a study before its budget is spent; None where one is not asked for."""
 
-    It ends when its episodes have taken so long [s], all runs together, or once the most that any θ is expected to
-    improve the score is less than so many standard deviations of the score's noise.
-    """
-
-    wall_time_s: float | None = None
+    wall_time_s: float | None = None  # how long its episodes take, all runs together [s]
+    # the least that any θ has to be expected to improve the score, in standard deviations of the score's noise
     no_improvement: float | None = None
 
 

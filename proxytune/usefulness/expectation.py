@@ -115,14 +115,11 @@ def donors_of(pairs: Iterable[Floats], metrics: int) -> Donors:
 
 @dataclass(frozen=True)
 class Expected:
-    """One measure in more episodes: what is expected of fresh ones, and what a perfect proxy scores on this target.
+    """One measure in more episodes."""
 
-    Floor (with where 95 % of its scores lie) and excess over it are None if noise is not known.
-    """
-
-    value: Estimate
-    floor: Estimate | None
-    excess: Estimate | None
+    value: Estimate  # what is expected of fresh ones
+    floor: Estimate | None  # what a perfect proxy scores, and where 95 % of its scores lie; None if noise is not known
+    excess: Estimate | None  # the value's over the floor; None likewise
 
 
 @dataclass(frozen=True, eq=False)

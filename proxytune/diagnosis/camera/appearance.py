@@ -194,14 +194,10 @@ LITTLE = 0.5
 
 @dataclass(frozen=True)
 class Grain:
-    """The noise of pixels [grey level], from so many pairs of frames from the same place; 0 if it never stood.
+    """The noise of pixels."""
 
-    Where it is not identified, only the interval's upper end says something: the floor's texture may be all that was
-    seen.
-    """
-
-    noise: Fitted
-    still_pairs: int
+    noise: Fitted  # [grey level]; not identified, it is below its interval's end: a floor's texture may be all of it
+    still_pairs: int  # pairs of frames from the same place that tell it; 0 if the robot never stood
 
 
 def fit_grain(measured: Pictures, predicted: NDArray[Any], floor: Flags) -> Grain:

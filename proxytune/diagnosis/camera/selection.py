@@ -86,18 +86,14 @@ RIVAL_NATS = 3.0
 
 @dataclass(frozen=True)
 class CameraSelection:
-    """The effects that a camera was found to need besides those declared, and what each explains by itself [nats].
+    """The effects that a camera was found to need besides those declared."""
 
-    Fits are with the declared effects alone, with those that are needed besides, and with every effect of the
-    catalogue. Rivals do as well.
-    """
-
-    declared: CameraFit
-    model: CameraFit
-    full: CameraFit
+    declared: CameraFit  # with the declared effects alone
+    model: CameraFit  # with those that are needed besides
+    full: CameraFit  # with every effect of the catalogue
     effects: tuple[str, ...]
-    alone: tuple[Subset, ...]
-    rivals: tuple[tuple[str, ...], ...]
+    alone: tuple[Subset, ...]  # what each effect explains by itself [nats]
+    rivals: tuple[tuple[str, ...], ...]  # sets of effects that do as well
 
 
 def fit_everything(views: Views, names: Sequence[str], fixed: Mapping[str, float], *, learn_scatter: bool) -> CameraFit:

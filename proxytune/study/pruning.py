@@ -111,7 +111,7 @@ def rescored_pruned(run: StudyRun, trial: TrialRecord) -> TrialRecord:
 
 
 def spared(run: StudyRun, trials: Sequence[TrialRecord]) -> tuple[int, float]:
-    """Count the episodes that pruned trials did without, none begun in vain, and the mean seconds of their like."""
+    """Count the episodes that pruned trials did without, none begun in vain, and the seconds of their like."""
     settings, seconds = run.settings, run.store.seconds()
     planned = [
         episode for trial in trials if trial.decided for episode in plan_episodes(settings, trial.theta, settings.seed)

@@ -110,7 +110,7 @@ def _squares(model: Fit, tested: Drives, variant: Variant) -> dict[float, Floats
 
 
 def _held_out(model: Fit, variant: Variant) -> tuple[Theta | None, dict[float, Floats]]:
-    """Squared held-out errors of a variant fitted to windows, by horizon [s]; of steps with their θ where better."""
+    """Squared held-out errors by horizon [s] of a variant fitted to windows, or to steps, with that θ, if better."""
     drives, length = model.drives, _length(model.drives)
     windows = multistep_fit.held_out_squares(drives, variant.theta, variant.free, length)
     if drives.robot.drive != "ackermann" or not windows:

@@ -151,7 +151,7 @@ def responses(fitted: Fit, others: Floats) -> Responses:
 
 
 def _changed_commands(drives: Drives) -> tuple[Whole, Whole]:
-    """Episode and tick of commands unlike the one before (C, 2), and phases (C,), within which MEMORY_S apart."""
+    """Episode and tick of commands unlike the one before (C, 2), and phases (C,); those of one are MEMORY_S apart."""
     before = np.concatenate((drives.rest[:, None], drives.duties[:, :-1]), axis=1)
     found = np.argwhere(drives.issued & np.any(np.abs(drives.duties - before) > 1e-9, axis=-1))
     # Of commands closer together than usual the first counts.

@@ -124,14 +124,11 @@ AT_ONCE = 60
 
 
 class PredictedPictures(NamedTuple):
-    """Some of a log's frames (n,) as a model would have seen them: red, green and blue (n, rows, columns, 3), 0 to 255.
+    """Some of a log's frames as a model would have seen them."""
 
-    `grey_errors` are mean absolute differences from the log's pictures on the floor (n,) [grey levels].
-    """
-
-    numbers: NDArray[np.intp]
-    pictures: NDArray[np.uint8]
-    grey_errors: NDArray[np.float64]
+    numbers: NDArray[np.intp]  # of these frames (n,)
+    pictures: NDArray[np.uint8]  # red, green and blue (n, rows, columns, 3), 0 to 255
+    grey_errors: NDArray[np.float64]  # mean absolute differences from the log's, on the floor (n,) [grey levels]
 
 
 def predict_pictures(log: Log, robot: Robot, theta: Theta) -> Iterator[PredictedPictures]:

@@ -56,6 +56,7 @@ def record(
     robot = driving.read_robot(family.robot, family.folder)
     rate = robot.figures["control_rate"]
     times = np.arange(round(seconds * rate)) / rate
+    instance = family.instance({})
     own = [] if table is None else _duties(Log(name, family.robot, table[0], rate, {}, ()), robot, table[1])
     episodes = []
     for number in range(repeats * (len(own) or len(LIBRARY))):
@@ -68,7 +69,9 @@ def record(
             if number // len(LIBRARY) % 2 == 1:
                 sized = mirrored(sized, robot)
         commands = np.asarray(np.round(sized, 4), dtype=float)
-        poses = _drive(family, commands, random, number)
+        start = np.array((0.0, 0.0, random.uniform(-np.pi, np.pi)))
+        with family.plant_at(instance.robot, start) as plant:
+            poses = tracked(driving.follow(instance, plant, start, commands, number), random)
         episodes.append(LogEpisode(str(number), times, commands, poses, None))
     return Log(name, family.robot, KIND[robot.drive], rate, {}, tuple(episodes))
 
@@ -84,14 +87,6 @@ def _duties(log: Log, robot: driving.Robot, drives: Mapping[str, tuple[Floats, F
 
 KIND = {"differential": "duty", "ackermann": "ackermann"}
 """Kind of the commands that robots are given, by how they drive."""
-
-
-def _drive(family: driving.LaneFollowing, duties: Floats, random: np.random.Generator, number: int) -> Floats:
-    start = np.array((0.0, 0.0, random.uniform(-np.pi, np.pi)))
-    instance = family.instance({})
-    with family.plant_at(instance.robot, start) as plant:
-        poses = driving.follow(instance, plant, start, duties, number)
-    return tracked(poses, random)
 
 
 def tracked(poses: Floats, random: np.random.Generator) -> Floats:

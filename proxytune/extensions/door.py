@@ -127,16 +127,19 @@ def load(
     return found
 
 
-def ask(what: str, question: Callable[[], Answer], where: str = "") -> Answer:
+def ask(
+    what: str, question: Callable[[], Answer], where: str = "", refuse: Callable[[str], Exception] = ExtensionError
+) -> Answer:
     """Ask code that is not ours.
 
     Args:
         what: Whose it is, as a complaint names it.
         question: Asks it.
         where: On what it was tried, as a complaint goes on.
+        refuse: Makes an error of the complaint.
 
     Raises:
-        ExtensionError: In one line, if it raises anything but an error of ours, or exits.
+        ExtensionError: In one line, or what `refuse` makes, if it raises anything but an error of ours, or exits.
     """
     try:
         return question()
@@ -145,7 +148,7 @@ def ask(what: str, question: Callable[[], Answer], where: str = "") -> Answer:
     except BaseException as problem:
         if is_users(problem):
             raise
-        raise ExtensionError(f"{what} raised {describe(problem)}{place_of(problem)}{where}; correct it") from problem
+        raise refuse(f"{what} raised {describe(problem)}{place_of(problem)}{where}; correct it") from problem
 
 
 def require(found: Any, needs: Iterable[str], *, name: str, kind: str) -> None:

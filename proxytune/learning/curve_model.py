@@ -121,15 +121,12 @@ def counts_at(place: Floats, first: float) -> Floats:
 
 @dataclass(frozen=True)
 class CurveModel:
-    """The process, fitted: what it says of the mean curves at any place.
-
-    Scores are centred and in units of their standard deviation.
-    """
+    """The process, fitted: what it says of the mean curves at any place."""
 
     marks: Examined
     values: Mapping[str, float]
-    centre: float
-    unit: float
+    centre: float  # of the scores
+    unit: float  # their standard deviation
     _factor: tuple[Floats, bool] = field(repr=False)
     _weights: Floats = field(repr=False)
 
@@ -229,17 +226,13 @@ DOUBT = 2.5
 
 @dataclass(frozen=True)
 class CurveDraws:
-    """Mean scores by name of the curve, (draws, counts) each, drawn from their posterior at counts of target samples.
-
-    They are NaN before anything can have been learnt, as it has after `first` samples. Where the data allow a curve to
-    rise only it is drawn so (`monotone`). The model that they are drawn from numbers its curves in their order.
-    """
+    """Mean scores drawn from their posterior at counts of target samples."""
 
     counts: Floats
-    scores: Mapping[str, Floats]
-    monotone: Mapping[str, bool]
-    model: CurveModel
-    first: float
+    scores: Mapping[str, Floats]  # by the curve's name (draws, counts), NaN before anything can have been learnt
+    monotone: Mapping[str, bool]  # whether the data allow a curve to rise only, and it is drawn so
+    model: CurveModel  # what they are drawn from; it numbers its curves in their order
+    first: float  # so many samples after which something has been learnt
 
 
 def draw_curves(

@@ -245,16 +245,14 @@ def split_samples(count: Floats | float, expert_drives: float) -> tuple[Floats, 
 
 
 def cost_saved(costs: Costs, *, without: tuple[Floats, Floats], with_proxy: tuple[Floats, Floats]) -> Floats:
-    """PLV in cost (eq. 6, as we read it): the price of on- and off-policy target samples that a proxy saves.
-
-    With an off-policy cost of 1, and without on-policy samples, it is eq. 5.
-    """
+    """PLV in cost (eq. 6, as we read it): the price of on- and off-policy target samples that a proxy saves."""
 
     def with_a_price(samples: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
         """Samples without those that cost nothing, of which there may be infinitely many."""
         on, off = (np.where(price > 0.0, count, 0.0) for price, count in zip(costs.per_sample, samples, strict=True))
         return on, off
 
+    # With an off-policy cost of 1, and without on-policy samples, it is eq. 5.
     cost_on, cost_off = costs.per_sample
     (on, off), (on_with, off_with) = with_a_price(without), with_a_price(with_proxy)
     return cost_on * (on - on_with) + cost_off * (off - off_with)  # eq. (6)

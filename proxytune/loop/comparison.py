@@ -22,16 +22,13 @@ Known = Mapping[str, tuple[float, Ends | None]]
 
 @dataclass(frozen=True)
 class Level:
-    """A measure of one proxy, its 95 % interval, and what a perfect proxy and, mean and deviation, chance would have.
-
-    None where something is not known; where only a bracket of the floor is, its ends are.
-    """
+    """A measure of one proxy; None where something is not known."""
 
     value: float
-    interval: Ends | None
-    floor: float | None = None
-    floor_ends: Ends | None = None
-    chance: Ends | None = None
+    interval: Ends | None  # 95 %
+    floor: float | None = None  # what a perfect proxy would have
+    floor_ends: Ends | None = None  # its interval, or a bracket where no more is known of it
+    chance: Ends | None = None  # mean and deviation by chance
 
 
 @dataclass(frozen=True)
@@ -81,22 +78,17 @@ def compare_errors(diagnosis: Mapping[str, Any]) -> list[Compared]:
 def _compare_error(key: str, title: str, error: Mapping[str, Any]) -> Compared:
     scale, unit = (1000.0, "mm") if error["unit"] == "m" else (1.0, error["unit"])
     low, high = (error.get(name) for name in ("noise_floor", "noise_floor_upper"))
-    bracket = _scaled((low, high), scale)
+    bracket = _ends(low, high, scale=scale)
     floor = scale * low if low is not None and bracket is None else None
     before, after = (
-        Level(scale * error[side], _scaled(error[f"{side}_interval"], scale), floor, bracket)
+        Level(scale * error[side], _ends(*error[f"{side}_interval"], scale=scale), floor, bracket)
         for side in ("before", "after")
     )
     return Compared(key, title.format(error.get("horizon_s", 0.0)), unit, before, after)
 
 
-def _scaled(ends: Sequence[float | None], scale: float) -> Ends | None:
-    low, high = ends
+def _ends(low: float | None, high: float | None, *, scale: float = 1) -> Ends | None:
     return None if low is None or high is None else (scale * low, scale * high)
-
-
-def _ends(low: float | None, high: float | None) -> Ends | None:
-    return None if low is None or high is None else (low, high)
 
 
 MOST_NAMED = 5

@@ -15,12 +15,10 @@ import tomlkit
 
 from proxytune.api import DiagnosisReport, Wanted, recordable
 from proxytune.diagnosis import camera_effects, diagnose_log, film, forget_stages, motion_effects, robot_of
-from proxytune.driving import Robot
 from proxytune.effects import Catalogue, effect_of
 from proxytune.errors import RunError, SettingsError, StoreError
 from proxytune.extensions import describe
 from proxytune.importing import open_log
-from proxytune.logs import Log
 from proxytune.loop.comparison import NEXT, compare_errors, floor_text, following, lacking, level_text, theta_table
 from proxytune.loop.opening import Loop, Teller
 from proxytune.report import figures_also_as, findings, write_text
@@ -51,28 +49,21 @@ def check_camera(loop: Loop) -> None:
 
 
 def diagnose_target(loop: Loop, source: Path, folder: Path, teller: Teller) -> None:
-    """Diagnose a log, and write what `diagnose` does: diagnosis.json, model.toml and figures.
-
-    What is declared is all that the study's box and its proxy have.
-    """
+    """Diagnose a log, and write what `diagnose` does: diagnosis.json, model.toml and figures."""
     with open_log(source, facts=loop.facts) as (log, notes):
         for note in notes:
             teller.say(note)
         robot = robot_of(log, loop.robot, Catalogue(loop.settings.folder.resolve()))
         with teller.diagnosis(log) as report:
-            declared, seed = declared_of(loop, robot, log), loop.settings.seed
+            known, seed = motion_effects(robot.catalogue), loop.settings.seed
+            # What the study declares and this log can be asked for
+            known = known if log.frames is None else (*known, *camera_effects(robot.catalogue))
+            declared = tuple(name for name in declared_names(loop) if name in known)
             found = diagnose_log(log, robot, declared, seed=seed, report=report, folder=folder)
             report("drawing")
             with figures_also_as(("svg",)):
                 DiagnosisReport(found).write(folder)
             forget_stages(folder)
-
-
-def declared_of(loop: Loop, robot: Robot, log: Log) -> tuple[str, ...]:
-    """The effects that the study declares and that this log can be asked for."""
-    known = motion_effects(robot.catalogue)
-    known = known if log.frames is None else (*known, *camera_effects(robot.catalogue))
-    return tuple(name for name in declared_names(loop) if name in known)
 
 
 def read_diagnosis(folder: Path) -> dict[str, Any]:
@@ -109,10 +100,7 @@ A_FOLDER_OF_ITS_OWN = (FILE_NAME, "log.toml")
 
 
 def extension_text(settings: StudySettings, model: Path, folder: Path) -> str:
-    """The study.toml of the extended study in this folder: as the study's own, but for its proxy and its paths.
-
-    What the study's own proxy has beside what was diagnosed stays, as [domain.effects].
-    """
+    """The study.toml of the extended study in this folder: as the study's own, but for its proxy and its paths."""
     values = dict(read_settings(settings.path).values)
     values |= {"name": f"{settings.name}_extended", "proxy": _from(folder, model)}
     targets = [_from(folder, path) for path in settings.targets]
@@ -121,6 +109,7 @@ def extension_text(settings: StudySettings, model: Path, folder: Path) -> str:
         values["truth"] = _from(folder, settings.truth)
     domain = {key: value for key, value in settings.domain.items() if key != "effects"}
     found = read_settings(model).section("effects").keys()
+    # What the study's own proxy has beside what was diagnosed stays.
     proxy = read_settings(settings.proxy).section("effects").values if settings.proxy else {}
     own = settings.domain.section("effects").values
     kept = {name: {**proxy.get(name, {}), **own.get(name, {})} for name in {**proxy, **own} if name not in found}

@@ -10,7 +10,6 @@ import os
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +18,6 @@ from proxytune.api import recordable
 from proxytune.domain import DomainFamily, Episode
 from proxytune.driving import AGENTS, LaneFollowing
 from proxytune.errors import InputError, LogError, RunError, SettingsError, StoreError
-from proxytune.extensions import ask
 from proxytune.importing import Facts, open_log
 from proxytune.logs import Log
 from proxytune.report import write_text
@@ -86,16 +84,13 @@ def held_out_settings(
 def drive_held_out(
     opened: study.Study, settings: study.StudySettings, theta: Theta, watcher: Watcher
 ) -> tuple[Assessment, int]:
-    """Drive held-out agents in the instance of a study's family, twice from each start, and assess it.
-
-    Episodes are kept in the study's own database, and those that are there are not driven again. The second time is for
-    the noise floor: what the instance scores against itself. Gives the assessment, and how many were driven now.
-    """
+    """Drive held-out agents in an instance, twice from each start: its assessment, and the episodes driven now."""
     held = replace(opened, settings=settings, target=study.read_target(settings, opened.family)[0])
     seeds = [fresh_seed(settings.seed, repetition) for repetition in (1, 2)]
     with locked(opened.settings.folder), Store.open(opened.settings.folder) as store:
         run = study.StudyRun(held, store, watcher)
         once, again = (_scores(run, study.plan_episodes(settings, theta, seed)) for seed in seeds)
+    # The second time is for the noise floor: what the instance scores against itself.
     floor = floor_of_repeats(domain=once, again=again, metrics=settings.metrics)
     return assess(proxy=once, target=held.target, metrics=settings.metrics, floor=floor), run.spent.episodes
 
@@ -156,7 +151,7 @@ def open_loop(path: Path, twin: Path | None = None, log: Path | None = None) -> 
     loop = Loop(settings, family, robot, twin, log, held_out_of(settings, family, driven=twin is not None))
     for name in loop.held_out:
         try:
-            ask(f"check_agent('{name}') of {settings.family}", partial(family.check_agent, name))
+            family.check_agent(name)
         except InputError as problem:
             raise settings.error(KEY, str(problem)) from None
     _check_log(loop)

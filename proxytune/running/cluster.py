@@ -79,17 +79,14 @@ class _Worker:
 
 @dataclass
 class _Held:
-    """A piece that a worker has, since when [s], and whether it has been given up or handed to another too.
-
-    Its result is fetched as soon as there is one: a worker may stop between ending a piece and handing it over, and
-    nobody else waits for that.
-    """
+    """A piece that a worker has."""
 
     number: int
     future: Any
+    # fetched as soon as there is one: a worker may stop before it hands it over, and nobody else waits for that
     result: Future[Any]
-    since: float
-    left_behind: bool = False
+    since: float  # when it was handed out [s]
+    left_behind: bool = False  # whether it has been given up, or handed to another too
 
 
 class _Pieces:

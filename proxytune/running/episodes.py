@@ -159,10 +159,7 @@ def _lost(watch: Watch, episode: Episode, end: WorkerExit) -> Outcome:
 
 
 class StallMonitor:
-    """Says again and again which fleet has been under way longest, if that is long; use as a context.
-
-    What tells is called from a thread of its own.
-    """
+    """Says again and again, from its own thread, which fleet has been under way longest, if for long; a context."""
 
     def __init__(self, tell: Callable[[str, float], None]) -> None:
         self._tell, self._begun, self._ended = tell, dict[Episode, float](), threading.Event()

@@ -85,16 +85,12 @@ def _attach(run: StudyRun, known: Sequence[Outcome | Theta]) -> None:
 
 @dataclass(frozen=True)
 class Finalist:
-    """A θ that has been driven again: the trial that visited it, or its own episodes as a trial of number UNVISITED.
+    """A θ that has been driven again."""
 
-    `scores` are the study's cost in each fresh repetition, None where an agent has no episode that worked; the
-    assessment, over all fresh episodes, is the answer's alone.
-    """
-
-    trial: TrialRecord
-    fresh: tuple[tuple[Outcome, ...], ...]
-    scores: tuple[float | None, ...]
-    assessment: Assessment | None = None
+    trial: TrialRecord  # the trial that visited it, or its own episodes as a trial of number UNVISITED
+    fresh: tuple[tuple[Outcome, ...], ...]  # outcomes of each fresh repetition
+    scores: tuple[float | None, ...]  # cost in each of these, None where an agent has no episode that worked
+    assessment: Assessment | None = None  # over all fresh episodes, of the answer alone
 
     @property
     def optimism(self) -> float | None:
@@ -208,11 +204,7 @@ def confirmation_of(run: StudyRun, trials: Sequence[TrialRecord], learnt: Knowle
 
 
 def finalists(trials: Sequence[TrialRecord], learnt: Knowledge) -> list[TrialRecord]:
-    """The θ that are driven again before the mean, that of lowest expected PRPV first, by what was finished alone.
-
-    Where no θ explains the target, the most probable one and the mean are worth little: then visited θ take their
-    place, those not more than a standard deviation of a fresh score behind. Without trials, earlier studies tell.
-    """
+    """The θ that are driven again before the mean, that of lowest expected PRPV first, by what was finished alone."""
     # Of a pruned trial it is certain that it is none of the best.
     scored = {learnt.space.values(trial.theta): trial for trial in trials if trial.state == "finished"}
     pruned = {learnt.space.values(trial.theta) for trial in trials} - scored.keys()
@@ -221,6 +213,7 @@ def finalists(trials: Sequence[TrialRecord], learnt: Knowledge) -> list[TrialRec
     best = min(expected, key=expected.__getitem__)
     noise = float(learnt.fresh_scores(best).std())
     near = [values for values, mean in expected.items() if mean - expected[best] <= noise]
+    # Where no θ explains the target, the most probable one and the mean are worth little: visited ones do instead.
     lacks = learnt.misfit.fits is False
     probable = learnt.likeliest_of(list(expected)) if lacks else learnt.mode
     chosen = list(dict.fromkeys([near[0], probable, *near[1:]]))[: MOST_FINALISTS - (not lacks)]
@@ -262,11 +255,9 @@ def _finalist(run: StudyRun, trial: TrialRecord, fresh: tuple[tuple[Outcome, ...
 
 
 def _learn_again(run: StudyRun, learnt: Knowledge, driven: Sequence[Finalist]) -> Knowledge:
-    """What is known of θ by the trials and by what the finalists did: each repetition has a placement of its own.
+    """What is known of θ by the trials and by what the finalists did: each repetition has a placement of its own."""
 
-    On 30 targets whose θ was known its mean was 0.047 of the box off in the median, that of the trials alone 0.054.
-    """
-
+    # On 30 targets whose θ was known its mean was 0.047 of the box off in the median, that of the trials alone 0.054.
     def trial_of(one: Finalist, outcomes: Iterable[Outcome], placement: int) -> Trial:
         values = learnt.space.values(one.trial.theta)
         return Trial(values, None, outputs_of(run.study, list(outcomes)), placement=placement)
@@ -283,12 +274,10 @@ def _learn_again(run: StudyRun, learnt: Knowledge, driven: Sequence[Finalist]) -
 
 
 def _answer(driven: Sequence[Finalist], learnt: Knowledge, again: Knowledge) -> Finalist:
-    """The mean, or the most probable, of those that PRPV cannot tell from the best; the best where no θ explains it.
-
-    Each has as many fresh episodes, so what fresh noise does to all of them alike favours none.
-    """
+    """The mean, or the most probable, of those that PRPV cannot tell from the best; the best where no θ explains it."""
     by_values = {learnt.space.values(one.trial.theta): one for one in driven}
     own = learnt.expected_of({values: one.trial.score or 0.0 for values, one in by_values.items()})
+    # Each has as many fresh episodes, so what fresh noise does to all of them alike favours none.
     fresh = {values: [score for score in one.scores if score is not None] for values, one in by_values.items()}
     expected = {values: float(np.mean([own[values], *scores])) for values, scores in fresh.items()}
     best = min(expected, key=expected.__getitem__)

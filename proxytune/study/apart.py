@@ -13,7 +13,6 @@ from proxytune.extensions import plugins
 from proxytune.running import RAISED, Fleet, Watch, can_run_together, run_episode, run_together, working
 from proxytune.seeds import preflight_seed
 from proxytune.storage import Store
-from proxytune.study.family import is_users_family
 from proxytune.study.settings import StudySettings
 
 APART = "apart"
@@ -28,12 +27,12 @@ WHY = {
 
 def users_agents(settings: StudySettings) -> list[str]:
     """The agents that proxytune does not bring: a user's own, plug-ins, and all of another domain family."""
-    installed, others = plugins("agent"), is_users_family(settings)
+    installed, ours = plugins("agent"), settings.family.startswith("proxytune.")
     names = zip(settings.agents, settings.loaded_agents, strict=True)
     return [
         agent
         for agent, name in names
-        if others or name in installed or (":" in name and not name.startswith("proxytune."))
+        if not ours or name in installed or (":" in name and not name.startswith("proxytune."))
     ]
 
 

@@ -98,10 +98,8 @@ def bank_of(run: StudyRun) -> Bank:
 
 
 def _starts_needed(reach: Mapping[int, float], most: int) -> int | None:
-    """The fewest starts whose interval reaches no further than WITHIN; None where that is more than there are.
-
-    Squared reaches follow a + b / starts: a is what trials leave unknown, and no start makes it less.
-    """
+    """The fewest starts whose interval reaches no further than WITHIN; None where that is more than there are."""
+    # Squared reaches follow a + b / starts: a is what trials leave unknown, and no start makes it less.
     counts = np.array(list(reach))
     design = np.stack([np.ones(len(counts)), 1.0 / counts], axis=1)
     (left, by_start), *_ = np.linalg.lstsq(design, np.array(list(reach.values())) ** 2, rcond=None)

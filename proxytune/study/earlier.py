@@ -50,15 +50,12 @@ Scores = Mapping[tuple[str, int], Mapping[str, float]]
 
 @dataclass(frozen=True)
 class Source:
-    """An earlier study: what its trials depend on, and the scores of each domain instance, failed episodes left out.
-
-    A table knows the variance by placement too, of each agent and metric.
-    """
+    """An earlier study."""
 
     path: Path
-    facts: Mapping[str, Any]
-    trials: Mapping[Instance, Scores]
-    placement: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    facts: Mapping[str, Any]  # what its trials depend on
+    trials: Mapping[Instance, Scores]  # scores of each domain instance, failed episodes left out
+    placement: Mapping[str, Mapping[str, float]] = field(default_factory=dict)  # variance by it, which a table knows
 
     def episode(self, theta: Instance, agent: str, start: int) -> Episode:
         """An episode of it."""

@@ -81,10 +81,7 @@ class ComparedFamilies:
 
     @cached_property
     def selection(self) -> Selection | None:
-        """The families by fresh PRPV, with every difference; fresh episodes share starts and seeds, so all are paired.
-
-        None where no family has any.
-        """
+        """The families by fresh PRPV, with all differences, paired by starts and seeds; None where none has any."""
         tables: dict[str, ScoreTable] = {one.name: one.fresh.inputs.proxy for one in self.families if one.fresh}
         if not tables:
             return None

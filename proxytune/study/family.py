@@ -8,15 +8,15 @@ failures are remembered until it changes.
 import functools
 import inspect
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from numbers import Integral
 from pathlib import Path
-from typing import Any, TypeVar, cast
+from typing import Any, cast
 
 from proxytune.domain import DomainFamily
 from proxytune.effects import parameter_hint
-from proxytune.errors import ExtensionError, InputError, ProxytuneError
-from proxytune.extensions import ask, describe, is_users, load, place_of
+from proxytune.errors import ExtensionError, InputError
+from proxytune.extensions import ask, load
 from proxytune.identity import digest, meaning_of, modules_beside
 from proxytune.settings import nearest
 from proxytune.space import Parameter
@@ -33,7 +33,6 @@ MEMBERS: Mapping[str, tuple[type, str]] = {
 }
 """What a domain family tells of itself, and as what."""
 METHODS = ("check_agent", "run")
-Value = TypeVar("Value")
 
 
 def load_family(settings: StudySettings, model: Path | None) -> DomainFamily:
@@ -57,11 +56,6 @@ def given_family(settings: StudySettings, family: Any) -> DomainFamily:
     return cast(DomainFamily, UserFamily(family, "the simulator"))
 
 
-def is_users_family(settings: StudySettings) -> bool:
-    """Tell whether the domain family is not proxytune's own."""
-    return not settings.family.startswith("proxytune.")
-
-
 def bare_family(settings: StudySettings, model: Path | None) -> DomainFamily:
     """The family itself, without a guard, and with agents by the names that it loads.
 
@@ -77,7 +71,8 @@ def bare_family(settings: StudySettings, model: Path | None) -> DomainFamily:
     except InputError as problem:
         raise settings.error("family", str(problem)) from None
     _check_signature(settings, factory, model)
-    family = _asked(settings, settings.family, lambda: factory(settings.domain, model=model))
+    refuse = functools.partial(settings.error, "family")
+    family = ask(settings.family, lambda: factory(settings.domain, model=model), refuse=refuse)
     _check(settings, family)
     return family  # type: ignore[no-any-return]
 
@@ -94,27 +89,15 @@ def _check_signature(settings: StudySettings, factory: Any, model: Path | None) 
         return
 
 
-def _asked(settings: StudySettings, what: str, ask: Callable[[], Value]) -> Value:
-    """The answer of a user's code; one line of what it raises instead."""
-    try:
-        return ask()
-    except ProxytuneError:
-        raise
-    except BaseException as problem:
-        if is_users(problem):
-            raise
-        raise settings.error("family", f"{what} raised {describe(problem)}{place_of(problem)}; correct it") from problem
-
-
 def _check(settings: StudySettings, family: DomainFamily) -> None:
     lacks = [member for member in (*MEMBERS, *METHODS) if not has_member(family, member)]
     if lacks:
         raise settings.error("family", f"{settings.family} made no domain family: it lacks {', '.join(lacks)}")
     for member, (kind, word) in MEMBERS.items():
-        value = _asked(settings, f"{member} of {settings.family}", functools.partial(getattr, family, member))
+        what, refuse = f"{member} of {settings.family}", functools.partial(settings.error, "family")
+        value = ask(what, functools.partial(getattr, family, member), refuse=refuse)
         if not isinstance(value, kind):
-            name = type(value).__name__
-            raise settings.error("family", f"{member} of {settings.family} must be {word}, got {name}")
+            raise settings.error("family", f"{what} must be {word}, got {type(value).__name__}")
     for interval in settings.space.intervals:
         given = f"[{interval.low:g}, {interval.high:g}]"
         bounds = (interval.low, interval.high)
@@ -124,17 +107,12 @@ def _check(settings: StudySettings, family: DomainFamily) -> None:
     for metric in settings.metrics:
         if metric.name not in family.metrics:
             raise settings.error("metrics", f"unknown metric '{metric.name}'; {nearest(metric.name, family.metrics)}")
-    for agent in settings.agents:
-        _check_agent(settings, family, agent)
-
-
-def _check_agent(settings: StudySettings, family: DomainFamily, agent: str) -> None:
-    name = settings.aliases.get(agent, agent)
-    key = f"agents.{agent}" if settings.aliases else "agents"
-    try:
-        ask(f"check_agent('{name}') of {settings.family}", lambda: family.check_agent(name))
-    except InputError as problem:
-        raise settings.error(key, str(problem)) from None
+    for agent, name in zip(settings.agents, settings.loaded_agents, strict=True):
+        try:
+            ask(f"check_agent('{name}') of {settings.family}", functools.partial(family.check_agent, name))
+        except InputError as problem:
+            key = f"agents.{agent}" if settings.aliases else "agents"
+            raise settings.error(key, str(problem)) from None
 
 
 def check_bounds(

@@ -22,14 +22,11 @@ ON_SEVERAL = ("run_many", "examine_together")
 
 @dataclass(frozen=True)
 class UserFamily:
-    """A domain family whose members are asked for one by one; what one of them raises is one line.
-
-    `name` is where it comes from, as a complaint has it; aliases pair an agent's name with that by which it is loaded.
-    """
+    """A domain family whose members are asked for one by one; what one of them raises is one line."""
 
     family: Any
-    name: str
-    aliases: tuple[tuple[str, str], ...] = ()
+    name: str  # where it comes from, as a complaint has it
+    aliases: tuple[tuple[str, str], ...] = ()  # agents' names, each with that by which it is loaded
 
     def __getattr__(self, member: str) -> Any:
         """Any member of the family; what asking for it raises is an ExtensionError."""

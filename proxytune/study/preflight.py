@@ -199,7 +199,7 @@ def run_preflight(run: StudyRun) -> Preflight | None:
     """
     if run.finished_trials():
         return None
-    learnt = _preflight(run, drive=True)
+    learnt = preflight_of(run, drive=True)
     if learnt is None or learnt.failure:
         return learnt
     first = _places(run.settings, 0)[0]
@@ -207,12 +207,8 @@ def run_preflight(run: StudyRun) -> Preflight | None:
     return replace(learnt, not_repeatable=not_repeatable(run.store))
 
 
-def preflight_of(run: StudyRun) -> Preflight | None:
-    """The pre-flight from what has been simulated; None if it is off, or an episode is still missing."""
-    return _preflight(run, drive=False)
-
-
-def _preflight(run: StudyRun, *, drive: bool) -> Preflight | None:
+def preflight_of(run: StudyRun, *, drive: bool = False) -> Preflight | None:
+    """The pre-flight from what has been simulated, or is now; None if it is off, or an episode is still missing."""
     settings = run.settings
     if not settings.preflight:
         return None
@@ -282,11 +278,9 @@ def _plan(settings: StudySettings, places: Sequence[Place], undecided: Sequence[
 
 
 def _group(settings: StudySettings, agent: str, place: Place, moved: Sequence[Interval]) -> list[Episode]:
-    """The base with a new seed, to measure the noise, the base, and each parameter that is moved at its two ends.
-
-    The new seed is the agent's own: agents that shared it would share one draw of the noise.
-    """
+    """The base with a new seed, to measure the noise, the base, and each parameter that is moved at its two ends."""
     base = centre_of(settings)
+    # The agent's own: agents that shared it would share one draw of the noise.
     seed = preflight_noise_seed(settings.seed, *place, sorted(settings.agents).index(agent))
     again = make_episode(base, agent=agent, start=place.start, seed=seed)
     instances = [base, *({**base, i.name: end} for i in moved for end in (i.low, i.high))]
@@ -317,14 +311,10 @@ UNKNOWN_NOISE = 0.1
 
 @dataclass(frozen=True, eq=False)
 class NoiseVariance:
-    """Variance of the difference of proxy's and target's mean scores at the same θ (agents, metrics).
-
-    The caution says what is lost; empty where both drive from the same starts and a pre-flight told what placement
-    does.
-    """
+    """Variance of the difference of proxy's and target's mean scores at the same θ (agents, metrics)."""
 
     variance: Floats
-    caution: str = ""
+    caution: str = ""  # what is lost; empty where both have the same starts and a pre-flight told what placement does
 
 
 def noise_of(run: StudyRun) -> NoiseVariance:
@@ -350,10 +340,7 @@ def noise_of(run: StudyRun) -> NoiseVariance:
 
 
 def placement_variance(run: StudyRun) -> Floats | None:
-    """Variance of an episode's metrics by its placement alone (agents, metrics), as the target has them.
-
-    By the pre-flight, or as the table of a bank has it; None where neither tells.
-    """
+    """Variance of metrics by placement alone (agents, metrics), by pre-flight or a bank's table; None without."""
     pairs, table = placement_pairs(run), run.study.target
     if pairs.size:
         return _shrunk((pairs[:, 0] - pairs[:, 1]) ** 2) / 2.0

@@ -33,26 +33,18 @@ PRIOR_DISAGREEMENT = 1e-3
 
 @dataclass(frozen=True)
 class PruningRule:
-    """The limit that the trials of a batch are held against: a function of the trials finished before it.
-
-    Agents are driven in this order, which is that of `disagreement`: mean |α_proxy − α_target| of pairs over scored
-    trials.
-    """
+    """The limit that the trials of a batch are held against: a function of the trials finished before it."""
 
     limit: float
-    order: tuple[str, ...]
-    disagreement: Floats
+    order: tuple[str, ...]  # in which agents are driven
+    disagreement: Floats  # mean |α_proxy − α_target| of pairs of agents, in this order, over scored trials
 
 
 def pruning_rule(run: StudyRun, done: Sequence[TrialRecord]) -> PruningRule | None:
-    """The rule that the next trials are held against; None where none is to be pruned.
-
-    That is so during the design, on which all else rests; where a tolerance is a percentage: what is a tie then depends
-    on agents not driven yet, so that no pair is decided before the last; and where the objective is another than PRPV,
-    of which the pairs decided say nothing.
-    """
+    """The rule that the next trials are held against; None where none is to be pruned, as during the design."""
     settings = run.settings
     scored = [trial for trial in done if trial.state == "finished"]
+    # What is a tie then depends on agents not driven yet; of another objective than PRPV decided pairs say nothing.
     percent = any(metric.percent for metric in settings.metrics)
     prunes = settings.cut_off and not percent and run.study.objective == PRPV
     if not prunes or len(done) < settings.initial or len(scored) < FEWEST:
@@ -78,10 +70,7 @@ Plan = tuple[TrialRecord, list[Episode]]
 def run_or_prune(
     run: StudyRun, trials: Sequence[TrialRecord], rule: PruningRule, what: str
 ) -> list[TrialRecord | None]:
-    """Simulate what is missing of the trials until each is through or pruned, and give those that were pruned.
-
-    Episodes that other processes have begun by then are kept in the store, but no trial stands on them.
-    """
+    """Simulate what is missing of the trials until each is through or pruned, and give those that were pruned."""
     study, place = run.study, {agent: number for number, agent in enumerate(rule.order)}
     plans: list[Plan] = []
     for trial in trials:
@@ -105,29 +94,24 @@ def run_or_prune(
         pruned.append(next(filter(None, found), None))
     run.watcher.begin(what, len(planned) - len(known))
     pairs = zip(pruned, plans, strict=True)
+    # Other processes have begun these; they are kept in the store, but no trial stands on them.
     vain = [one for trial, (_, episodes) in pairs if trial for one in episodes if one.agent not in trial.decided]
     run.spent += Spent(unused=sum(episode in known and episode not in before for episode in vain))
     return pruned
 
 
 def rescored_pruned(run: StudyRun, trial: TrialRecord) -> TrialRecord:
-    """Score a pruned trial by the study's metrics, if others had led to its end.
-
-    Its agents decided then bound PRPV now (beside a tolerance in percent only nearly); the estimate takes every other
-    pair for one like theirs.
-    """
+    """Score a pruned trial by the study's metrics, if others had led to its end."""
     outcomes = run.known(run.episodes_of(trial)).values()
     worked = [outcome for outcome in outcomes if outcome.metrics is not None]
     bound = float(disagreement_of(run.study, score_table(worked), trial.decided).sum())
     driven, agents = len(trial.decided), len(run.settings.agents)
+    # Every other pair is taken for one like theirs; beside a tolerance in percent the bound is only nearly one.
     return replace(trial, bound=bound, score=bound * agents * (agents - 1) / (driven * (driven - 1)))
 
 
 def spared(run: StudyRun, trials: Sequence[TrialRecord]) -> tuple[int, float]:
-    """Count the episodes that pruned trials did without, and how long their like take [s], by the others' mean time.
-
-    Those that other processes had begun in vain are not among them.
-    """
+    """Count the episodes that pruned trials did without, none begun in vain, and the seconds of their like."""
     settings, seconds = run.settings, run.store.seconds()
     planned = [
         episode for trial in trials if trial.decided for episode in plan_episodes(settings, trial.theta, settings.seed)
@@ -147,16 +131,14 @@ def _decided(study: Study, rule: PruningRule, plan: Plan, known: Mapping[Episode
 def _pruned_at(
     study: Study, rule: PruningRule, plan: Plan, known: Mapping[Episode, Outcome], count: int
 ) -> TrialRecord | None:
-    """The trial as it was stopped, where the first so many agents are enough to prune it; else None.
-
-    PRPV of the pairs decided is a bound; what is expected of all pairs is its score.
-    """
+    """The trial as it was stopped, where the first so many agents are enough to prune it; else None."""
     trial, planned = plan
     names, driven = rule.order[:count], [known[episode] for episode in planned[: count * study.settings.starts]]
     worked = [outcome for outcome in driven if outcome.metrics]
     if {outcome.episode.agent for outcome in worked} != set(names):
         # An agent that failed from every start leaves the trial without a score, not with a bad one.
         return None
+    # PRPV of the pairs decided is a bound; what is expected of all pairs is its score.
     bound = float(disagreement_of(study, score_table(worked), names).sum())
     share = rule.disagreement[:count, :count].sum() / rule.disagreement.sum()
     failed, score = len(driven) - len(worked), float(bound / share)

@@ -15,7 +15,6 @@ from proxytune.errors import RunError
 from proxytune.space import Space
 from proxytune.storage import State, TrialRecord
 from proxytune.study.earlier import earlier_trials, known_trials
-from proxytune.study.facts import check_facts
 from proxytune.study.opening import Objective
 from proxytune.study.preflight import check_some_work, noise_of
 from proxytune.study.pruning import pruning_rule, run_or_prune
@@ -36,16 +35,14 @@ class AfterEarlier:
 
 
 def retry_failed(run: StudyRun) -> None:
-    """Drive failed episodes of ended trials again where the user's code has changed since, and score these trials anew.
-
-    Such a trial is driven in full, also if it was pruned before. θ of later trials stay what they are.
-    """
+    """Drive failed episodes of ended trials again where the user's code has changed since; score these trials anew."""
     for trial in run.finished_trials():
         if trial.failed_episodes:
             known = run.known(run.episodes_of(trial))
             failed = [episode for episode, outcome in known.items() if outcome.metrics is None]
             # Where fewer have failed than the trial says, they were tried again before this process.
             if len(failed) != trial.failed_episodes or any(episode in run.corrected for episode in failed):
+                # In full, also if it was pruned before; θ of later trials stay what they are.
                 planned = plan_episodes(run.settings, trial.theta, run.settings.seed)
                 run.outcomes(planned, f"trial {trial.number} again")
                 run.save_trials(record(trial.number, run.evaluation_of(trial)))
@@ -68,16 +65,14 @@ def run_trials(run: StudyRun, proposer: search.Proposer) -> None:
     """Run a study's trials to the end of its budget, or until a rule stops it, from wherever it was left.
 
     The next batch is a function of the seed and the trials before it alone, and an episode that has been simulated is
-    never simulated again: a study stopped at any moment goes on as if it had not been.
+    never simulated again: a study stopped at any moment goes on as if it had not been. Facts are those in the store.
 
     Raises:
-        SettingsError: If what the finished trials depend on has changed.
         EpisodeError: If an episode fails and the study is to stop then.
         RunError: If the machine fails, every episode of the first trial fails alike, or no trial of the initial
             design has a score.
         StoreError: If the database cannot be written.
     """
-    check_facts(run)
     settings = run.settings
     for trial in run.finished_trials():
         planned = run.episodes_of(trial)

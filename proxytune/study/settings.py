@@ -44,11 +44,6 @@ def targets_of(read: Section) -> tuple[str, ...]:
     return read.texts("target") or (read.text("target"),)
 
 
-def aliases_of(read: Section) -> dict[str, str]:
-    """The table [agents], where it is one: name in tables to what is loaded."""
-    return texts_of(read.section("agents")) if isinstance(read.values.get("agents"), dict) else {}
-
-
 def texts_of(table: Section) -> dict[str, str]:
     """The texts of a table, by key."""
     return {name: table.text(name) for name in table.values}
@@ -56,13 +51,10 @@ def texts_of(table: Section) -> dict[str, str]:
 
 @dataclass(frozen=True)
 class StopRules:
-    """The rules that end a study before its budget is spent; None where one is not asked for.
+    """The rules that end a study before its budget is spent; None where one is not asked for."""
 
-    It ends when its episodes have taken so long [s], all runs together, or once the most that any θ is expected to
-    improve the score is less than so many standard deviations of the score's noise.
-    """
-
-    wall_time_s: float | None = None
+    wall_time_s: float | None = None  # how long its episodes take, all runs together [s]
+    # the least that any θ has to be expected to improve the score, in standard deviations of the score's noise
     no_improvement: float | None = None
 
 
@@ -289,7 +281,9 @@ def _settings(read: Section) -> StudySettings:
     if read.whole("format", low=1) > FORMAT:
         raise read.error("format", f"this proxytune reads up to {FORMAT}; install a newer one")
     targets, objective = tuple(read.file("target", name) for name in targets_of(read)), read.text("objective", "prpv")
-    agents = tuple(aliases_of(read)) or read.texts("agents")
+    # The names in tables of what is loaded, where [agents] is a table.
+    aliases = texts_of(read.section("agents")) if isinstance(read.values.get("agents"), dict) else {}
+    agents = tuple(aliases) or read.texts("agents")
     if len(agents) < 2:
         raise read.error("agents", f"comparing takes at least two agents, got {len(agents)}")
     rules, low_fidelity = read.section("stop"), read.texts("low_fidelity", ())
@@ -320,7 +314,7 @@ def _settings(read: Section) -> StudySettings:
         space=_space(read.section("parameters")),
         domain=read.section("domain"),
         teaching=read_teaching(read.section("teaching")),
-        aliases=aliases_of(read),
+        aliases=aliases,
         targets=targets,
         learn_from=read.texts("learn_from", ()),
         low_fidelity=low_fidelity,

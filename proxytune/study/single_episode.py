@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -10,8 +11,7 @@ from numpy.typing import NDArray
 
 from proxytune.domain import DomainFamily, Episode, Recording
 from proxytune.effects import is_learnt, parameter_hint
-from proxytune.errors import EpisodeError, InputError, ProxytuneError
-from proxytune.extensions import describe
+from proxytune.errors import EpisodeError, InputError
 from proxytune.running import run_episode
 from proxytune.settings import read_settings
 from proxytune.space import Theta
@@ -60,12 +60,7 @@ def check_episode(family: DomainFamily, agent: str, theta: Theta, start: int) ->
     Raises:
         InputError: With what it has.
     """
-    try:
-        family.check_agent(agent)
-    except ProxytuneError:
-        raise
-    except Exception as problem:
-        raise InputError(f"agent '{agent}': check_agent of the domain family raised {describe(problem)}") from problem
+    family.check_agent(agent)
     if not 0 <= start < family.starts:
         raise InputError(f"start {start}: the family has {family.starts}; give 0 to {family.starts - 1}")
     # A model.toml checks its learnt curves where it is read; a family that is built of effects drives them.
@@ -92,35 +87,29 @@ def record_episode(family: DomainFamily, episode: Episode, *, filmed: bool = Fal
     Raises:
         EpisodeError: If the agent or the domain fails, or columns of its recording do not belong together.
     """
-    recorder: Any = _Recorder(family, filmed)
+    kept, pictures = Recording({}, {}, {}), None
+    own: Any = family
+
+    def run(episode: Episode) -> Mapping[str, float]:
+        nonlocal kept, pictures
+        if not can_record(family):
+            return family.run(episode)
+        kept = own.record(episode)
+        _check_columns("poses", kept.poses)
+        _check_columns("commands", kept.commands)
+        if filmed and hasattr(family, "replay"):
+            issued = np.column_stack([column for name, column in kept.commands.items() if name != "time"])
+            seen = np.asarray(own.replay(episode, issued).pictures)
+            coloured = seen.dtype == np.uint8 and seen.ndim == 4 and seen.shape[-1] == 3
+            pictures = seen if coloured and len(seen) == len(issued) else None
+        return kept.metrics  # type: ignore[no-any-return]
+
+    # What running an episode asks of a family
+    recorder: Any = SimpleNamespace(metrics=family.metrics, run=run)
     outcome = run_episode(recorder, episode)
     if outcome.metrics is None:
         raise EpisodeError(failure_of(outcome))
-    return RecordedEpisode(outcome.metrics, recorder.kept.poses, recorder.kept.commands, recorder.pictures)
-
-
-class _Recorder:
-    """What running an episode asks of a family, answered by one that records it if it can."""
-
-    def __init__(self, family: Any, filmed: bool) -> None:
-        self._family, self._filmed = family, filmed
-        self.metrics: Mapping[str, str] = family.metrics
-        self.kept = Recording({}, {}, {})
-        self.pictures: NDArray[np.uint8] | None = None
-
-    def run(self, episode: Episode) -> Mapping[str, float]:
-        """Run the episode, and keep its recording and pictures."""
-        if not can_record(self._family):
-            return self._family.run(episode)  # type: ignore[no-any-return]
-        self.kept = self._family.record(episode)
-        _check_columns("poses", self.kept.poses)
-        _check_columns("commands", self.kept.commands)
-        if self._filmed and hasattr(self._family, "replay"):
-            issued = np.column_stack([column for name, column in self.kept.commands.items() if name != "time"])
-            pictures = np.asarray(self._family.replay(episode, issued).pictures)
-            coloured = pictures.dtype == np.uint8 and pictures.ndim == 4 and pictures.shape[-1] == 3
-            self.pictures = pictures if coloured and len(pictures) == len(issued) else None
-        return self.kept.metrics
+    return RecordedEpisode(outcome.metrics, kept.poses, kept.commands, pictures)
 
 
 def _check_columns(what: str, columns: Columns) -> None:

@@ -345,11 +345,9 @@ class StudyRun:
         return self._learnt[asked]
 
     def search_trial(self, trial: TrialRecord) -> Trial:
-        """A finished trial as the search sees it; of one that was pruned, the outputs of the agents driven until then.
-
-        Of these the store may happen to have more: other processes had begun them. Refused if it lacks any.
-        """
+        """A finished trial as the search sees it; of one that was pruned, outputs of the agents driven until then."""
         if trial.number not in self._trials:
+            # Of these the store may happen to have more: other processes had begun them.
             planned = self.episodes_of(trial)
             known = self.known(planned)
             if len(known) < len(planned):

@@ -11,7 +11,6 @@ import shutil
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any, NoReturn
 
 import numpy as np
@@ -41,10 +40,8 @@ def prepare_points(setup: TeachingSetup, points: Sequence[CurvePoint], jobs: int
 def score_points(
     setup: TeachingSetup, points: Sequence[CurvePoint], jobs: int
 ) -> AbstractContextManager[Iterator[tuple[CurvePoint, float]]]:
-    """Score the points in parallel, each yielded as soon as it is there.
-
-    Those that take longest begin first: otherwise one of them, begun last, would keep one process busy alone.
-    """
+    """Score the points in parallel, each yielded as soon as it is there."""
+    # Otherwise one of those that take longest, begun last, would keep one process busy alone.
     ordered = sorted(points, key=lambda point: -point.count)
     return _spread(setup, functools.partial(_score, setup.score), ordered, jobs)
 
@@ -57,22 +54,17 @@ def _score(score: Callable[[CurvePoint], float], point: CurvePoint) -> tuple[Cur
 def _spread(
     setup: TeachingSetup, work: Callable[[CurvePoint], Any], points: Sequence[CurvePoint], jobs: int
 ) -> Iterator[Iterator[Any]]:
-    """Do the points, in processes that a limit may end where there is one."""
-    with _traces(setup.cache.folder / TRACES) as folder:
-        traced = TracedTask(work, folder)
-        rescue = Rescue[CurvePoint, Any](_Loss(setup.timeout_s, traced), isolated=setup.timeout_s is not None)
-        with working(traced, points, jobs, rescue=rescue) as done:
-            yield done
-
-
-@contextmanager
-def _traces(folder: Path) -> Iterator[Path]:
-    """An empty folder for the points' traces, where there is room for one; a killed command may have left its own."""
+    """Do the points, in processes that a limit may end where there is one, with traces where there is room for them."""
+    folder = setup.cache.folder / TRACES
+    # A killed command may have left its own.
     shutil.rmtree(folder, ignore_errors=True)
     with suppress(OSError):
         folder.mkdir(parents=True)
+    traced = TracedTask(work, folder)
+    rescue = Rescue[CurvePoint, Any](_Loss(setup.timeout_s, traced), isolated=setup.timeout_s is not None)
     try:
-        yield folder
+        with working(traced, points, jobs, rescue=rescue) as done:
+            yield done
     finally:
         shutil.rmtree(folder, ignore_errors=True)
 
@@ -141,10 +133,7 @@ def examine_curves(
     watcher: Watcher,
     known: learning.ExaminationScores | None = None,
 ) -> dict[learning.Examination, float]:
-    """Examine learners of these proxies, None of the one without; what is cached is not made again.
-
-    The known scores, of learners that are not examined further, are given back with the new ones.
-    """
+    """Examine learners of these proxies, None of the one without, if that is not cached; `known` scores come along."""
     taught, scores = setup.settings, dict(known or {})
     if taught.examinations is None:
         every = itertools.product(proxies, range(taught.seeds), taught.target_samples)

@@ -302,24 +302,22 @@ def predictivity(run: study.StudyRun, proxies: Mapping[str, learning.Distributio
     Raises:
         EpisodeError: If an episode fails and the study is to stop then.
     """
-    return {name: _predictivity(run, name, proxy) for name, proxy in proxies.items()}
-
-
-def _predictivity(run: study.StudyRun, name: str, proxy: learning.Distribution) -> Predictivity | None:
-    settings, target = run.settings, run.study.target
-    drawn = [study.plan_episodes(settings, proxy.draw(start), settings.seed) for start in range(settings.starts)]
-    planned = [episode for start, each in enumerate(drawn) for episode in each if episode.start == start]
-    found = run.outcomes(planned, f"agents in {name}")
-    evaluation = study.evaluate_outcomes(run.study, proxy.centre, [found[episode] for episode in planned])
-    if evaluation.proxy is None or evaluation.prpv is None:
-        return None
-    inputs = usefulness.compare(proxy=evaluation.proxy, target=target, metrics=settings.metrics)
-    by_chance = usefulness.chance(inputs)
-    if usefulness.why_not_repeated(inputs):
-        return Predictivity(evaluation.prpv, by_chance, None)
-    means = usefulness.bootstrap_means(inputs, resamples=learning.POSTERIOR_DRAWS, seed=0)
-    resampled = usefulness.in_blocks(lambda here, there: usefulness.prpv_of_means(here, there, inputs.metrics), *means)
-    return Predictivity(evaluation.prpv, by_chance, resampled)
+    settings, known = run.settings, dict[str, Predictivity | None]()
+    for name, proxy in proxies.items():
+        drawn = [study.plan_episodes(settings, proxy.draw(start), settings.seed) for start in range(settings.starts)]
+        planned = [episode for start, each in enumerate(drawn) for episode in each if episode.start == start]
+        found = run.outcomes(planned, f"agents in {name}")
+        evaluation = study.evaluate_outcomes(run.study, proxy.centre, [found[episode] for episode in planned])
+        if evaluation.proxy is None or evaluation.prpv is None:
+            known[name] = None
+            continue
+        inputs = usefulness.compare(proxy=evaluation.proxy, target=run.study.target, metrics=settings.metrics)
+        resampled = None
+        if not usefulness.why_not_repeated(inputs):
+            means = usefulness.bootstrap_means(inputs, resamples=learning.POSTERIOR_DRAWS, seed=0)
+            resampled = usefulness.in_blocks(lambda p, t: usefulness.prpv_of_means(p, t, settings.metrics), *means)
+        known[name] = Predictivity(evaluation.prpv, usefulness.chance(inputs), resampled)
+    return known
 
 
 @dataclass(frozen=True)

@@ -57,14 +57,11 @@ def watching(what: str, timeout_s: float | None = None) -> Iterator[None]:
 
 @dataclass(frozen=True)
 class Supervised:
-    """A classroom of which each lesson and examination is named where it fails, and ended where it takes too long.
-
-    It is the "proxy" or the "target" domain; an episode may take `timeout_s` [s], or as long as it takes.
-    """
+    """A classroom of which each lesson and examination is named where it fails, and ended where it takes too long."""
 
     room: Any
-    domain: str
-    timeout_s: float | None
+    domain: str  # "proxy" or "target"
+    timeout_s: float | None  # how long an episode may take [s], if limited
 
     def __getattr__(self, member: str) -> Any:
         """A member of the classroom; one that drives an episode is named, and ended."""
@@ -96,19 +93,18 @@ class Supervised:
 
 @dataclass(frozen=True)
 class Lessons:
-    """The lessons in a domain of this identity, in rounds: one where the expert drives, several where the learner does.
+    """The lessons in a domain, in rounds: one where the expert drives, several where the learner does.
 
-    Each takes `lesson_s` [s] at a θ of its own, `where` being p(θ); `grid` is the number of samples after each round. A
-    learner drives in each round as it has learnt to in those before; as long as there is nothing, the expert does.
+    A learner drives in each round as it has learnt to in those before; as long as there is nothing, the expert does.
     """
 
     room: Classroom
-    domain: str
-    where: learning.Distribution
+    domain: str  # its identity
+    where: learning.Distribution  # p(θ), of which each lesson has a θ of its own
     seed: int
-    lesson_s: float
-    grid: tuple[int, ...]
-    by: str
+    lesson_s: float  # how long a lesson takes [s]
+    grid: tuple[int, ...]  # number of samples after each round
+    by: str  # who drives
 
     @property
     def on_policy(self) -> bool:
@@ -143,14 +139,13 @@ class Lessons:
 class Stage:
     """A stage of learning: what a learner learns in one domain, after what it has learnt in another.
 
-    Facts of what comes before enter those of what comes after as their digest: each key is short and complete. The seed
-    is of the learner's weights and of its samples' order; without a stage `before` it begins from scratch.
+    Facts of what comes before enter those of what comes after as their digest: each key is short and complete.
     """
 
     setup: "TeachingSetup"
-    seed: int
+    seed: int  # of the learner's weights and of its samples' order
     lessons: Lessons
-    before: "Stage | None" = None
+    before: "Stage | None" = None  # without one it begins from scratch
 
     def weights_facts(self, count: int) -> dict[str, Any] | None:
         """All that determines the weights after so many samples; None where nothing has been learnt."""
@@ -220,34 +215,27 @@ PROXY_ROUNDS = 4
 
 @dataclass(frozen=True)
 class CurvePoint:
-    """One point of a learning curve under one seed: after p(θ) of a proxy, if one taught first, so many target samples.
+    """One point of a learning curve."""
 
-    The proxy's name is for error lines only. Learners with and without a proxy share a repetition's target samples.
-    """
-
-    name: str
-    proxy: learning.Distribution | None
-    repetition: int
-    count: int
+    name: str  # the proxy's, for error lines only
+    proxy: learning.Distribution | None  # p(θ) of the proxy, if one taught first
+    repetition: int  # of which learners with and without a proxy share the target samples
+    count: int  # target samples after that
 
 
 @dataclass(frozen=True)
 class TeachingSetup:
-    """A learning experiment ready to run: both domain families, the learner, how much of what, and the cache of it all.
-
-    `learner_identity` is a digest of the learner's code and settings; the seed is the study's, and the starts are those
-    of an examination. An episode of it or of a lesson may take `timeout_s` [s], or as long as it takes.
-    """
+    """A learning experiment ready to run: both families, the learner, how much of what, and the cache of it all."""
 
     proxy: Classroom
     target: Classroom
     learner: learning.Learner
-    learner_identity: str
+    learner_identity: str  # a digest of the learner's code and settings
     settings: learning.TeachingSettings
-    seed: int
-    starts: int
+    seed: int  # the study's
+    starts: int  # of an examination
     cache: learning.Cache
-    timeout_s: float | None = None
+    timeout_s: float | None = None  # how long an episode of it or of a lesson may take [s], if limited
 
     @functools.cached_property
     def identities(self) -> tuple[str, str]:

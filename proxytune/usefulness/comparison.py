@@ -122,12 +122,9 @@ def repeats(table: ScoreTable) -> Whole:
 
 
 def is_repeated(table: ScoreTable) -> bool:
-    """Check that every start has two repeats or more, so that a domain can be compared with itself from them.
-
-    Every agent must have driven some start twice. A start that one agent alone drove is no start but a label of that
-    agent's own.
-    """
+    """Check that each start has two repeats or more, and each agent drove one twice, to hold a domain to itself."""
     labels, driven = np.bincount(start_places(table)), repeats(table)
+    # A start that one agent alone drove is no start but a label of that agent's own.
     shared = (driven > 0).sum(axis=0) >= 2
     return bool(labels.min() >= 2 and shared.all() and (driven >= 2).any(axis=1).all())
 

@@ -115,14 +115,11 @@ def donors_of(pairs: Iterable[Floats], metrics: int) -> Donors:
 
 @dataclass(frozen=True)
 class Expected:
-    """One measure in more episodes: what is expected of fresh ones, and what a perfect proxy scores on this target.
+    """One measure in more episodes."""
 
-    Floor (with where 95 % of its scores lie) and excess over it are None if noise is not known.
-    """
-
-    value: Estimate
-    floor: Estimate | None
-    excess: Estimate | None
+    value: Estimate  # what is expected of fresh ones
+    floor: Estimate | None  # what a perfect proxy scores, and where 95 % of its scores lie; None if noise is not known
+    excess: Estimate | None  # the value's over the floor; None likewise
 
 
 @dataclass(frozen=True, eq=False)
@@ -206,14 +203,12 @@ def _again(table: ScoreTable, donors: Donors, rng: np.random.Generator, columns:
 
 
 def _perfect(sides: Comparison, donors: Donors, rng: np.random.Generator) -> Floats:
-    """Mean scores of a perfect proxy: the target's cells repeated, each start once, by one of its repeats.
-
-    A proxy that drives from other starts meets starts like the target's: as many of them, drawn with replacement.
-    """
+    """Mean scores of a perfect proxy: the target's cells repeated, each start once, by one of its repeats."""
     places = start_places(sides.target)
     count = int(places.max()) + 1
     keys = rng.random((DRAWS, len(places)))
     each = np.stack([np.where(places == start, keys, -1.0).argmax(axis=1) for start in range(count)], axis=1)
+    # From other starts it meets starts like the target's: as many of them, drawn with replacement.
     if not sides.paired:
         drawn = rng.integers(count, size=(DRAWS, len(sides.proxy.episodes)))
         each = np.take_along_axis(each, drawn, axis=1)

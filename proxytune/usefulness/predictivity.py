@@ -75,10 +75,7 @@ def ppv(inputs: Comparison, beta: Mapping[str, float] | None = None) -> Ppv:
 
 
 def weights_of_spread(target: Floats) -> Floats:
-    """One over the spread of the agents' mean scores (…, agents, metrics) on the target.
-
-    It is 0 where all agents score alike, or so nearly that squares of the spread are none.
-    """
+    """One over the spread of agents' mean scores (…, agents, metrics) on the target; 0 where all are nearly alike."""
     spreads = target.std(axis=-2, ddof=1)
     varied = varies(target) & (spreads > SMALLEST_SPREAD)
     return np.where(varied, 1.0 / np.where(varied, spreads, 1.0), 0.0)

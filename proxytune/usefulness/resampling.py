@@ -84,10 +84,7 @@ def _means_of_draws(table: ScoreTable, rng: np.random.Generator, resamples: int)
 
 
 def agent_blocks(table: ScoreTable, draws: int) -> Iterator[tuple[slice, Flags]]:
-    """Agents of which episodes are drawn together, and what they drove.
-
-    Where all drove the same episodes these are all agents, with one row for them; otherwise as many as memory takes.
-    """
+    """Agents drawn together, and what they drove: all, by one row, if that is alike, else as many as memory takes."""
     if table.complete:
         yield slice(None), table.driven[:1]
         return

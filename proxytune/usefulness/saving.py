@@ -213,12 +213,10 @@ def _pairs(every: Sequence[Comparison], column: int) -> _Pairs | None:
 
 
 def _variances(table: ScoreTable, column: int) -> Floats:
-    """Variance of a rollout of each agent: of successes by their rate with two of each kind added, else pooled.
-
-    Two of each kind are the z²/2 of Agresti and Coull (1998): with one, intervals over few rollouts hold 92 %.
-    """
+    """Variance of a rollout of each agent: of successes by their rate with two of each kind added, else pooled."""
     values = table.values[..., column]
     if np.isin(values[table.driven], (0.0, 1.0)).all():
+        # Two of each kind are the z²/2 of Agresti and Coull (1998): with one, intervals over few hold 92 %.
         rates = (np.nansum(values, axis=1) + 2.0) / (table.counts + 4.0)
         return np.asarray(rates * (1.0 - rates), dtype=np.float64)
     squares = np.nansum((values - np.nanmean(values, axis=1, keepdims=True)) ** 2)

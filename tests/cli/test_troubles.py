@@ -15,7 +15,7 @@ from stopping import Stopping
 from proxytune.cli.main import main
 from proxytune.search import make_proposer
 from proxytune.storage import Store
-from proxytune.study import StudyRun, open_study, run_trials
+from proxytune.study import StudyRun, check_facts, open_study, run_trials
 
 slow = pytest.mark.slow
 
@@ -61,7 +61,9 @@ def test_a_write_ahead_log_cut_off_by_a_crash_costs_only_what_was_cut_off(make_s
     with Store.open(folder) as store:
         with pytest.raises(KeyboardInterrupt):
             # Of twenty episodes all is in the log still: SQLite has moved nothing to study.db yet
-            run_trials(StudyRun(study, store, Stopping(60 if share else 20)), make_proposer("gp", 5))
+            run = StudyRun(study, store, Stopping(60 if share else 20))
+            check_facts(run)
+            run_trials(run, make_proposer("gp", 5))
         for name in ("study.db", "study.db-wal"):
             shutil.copy(folder / name, crashed / name)
     log = crashed / "study.db-wal"

@@ -7,7 +7,7 @@ from pathlib import Path
 from proxytune.running import Silent
 from proxytune.search import make_proposer
 from proxytune.storage import Store
-from proxytune.study import StudyRun, goal_of, open_study, result_of, run_trials
+from proxytune.study import StudyRun, check_facts, goal_of, open_study, result_of, run_trials
 
 
 def changed(folder, **changes):
@@ -21,6 +21,7 @@ def searched(study, watcher=None):
     with Store.open(study.settings.folder) as store:
         proposer = make_proposer(study.settings.engine, study.settings.initial, goal_of(StudyRun(study, store)))
         run = StudyRun(study, store, watcher or Silent())
+        check_facts(run)
         run_trials(run, proposer)
         return run.spent, store.trials()
 

@@ -66,16 +66,12 @@ WIDEST = (0.06, 0.01)
 
 @dataclass(frozen=True)
 class MovingEdges:
-    """Points on the edges of markings in measured frames (P,), whose `normal` (P, 2) goes from dark to bright.
+    """Points on the edges of markings in measured frames."""
 
-    Places are columns and rows (P, 2) [pixel], 0.5 in the first pixel's middle; `speed` along the normal [pixel/s] is 0
-    in still frames.
-    """
-
-    frame: NDArray[np.intp]
-    place: Floats
-    normal: Floats
-    speed: Floats
+    frame: NDArray[np.intp]  # (P,)
+    place: Floats  # columns and rows (P, 2) [pixel], 0.5 in the first pixel's middle
+    normal: Floats  # from dark to bright (P, 2)
+    speed: Floats  # along the normal (P,) [pixel/s], 0 in still frames
 
 
 @dataclass(frozen=True)
@@ -198,14 +194,10 @@ LITTLE = 0.5
 
 @dataclass(frozen=True)
 class Grain:
-    """The noise of pixels [grey level], from so many pairs of frames from the same place; 0 if it never stood.
+    """The noise of pixels."""
 
-    Where it is not identified, only the interval's upper end says something: the floor's texture may be all that was
-    seen.
-    """
-
-    noise: Fitted
-    still_pairs: int
+    noise: Fitted  # [grey level]; not identified, it is below its interval's end: a floor's texture may be all of it
+    still_pairs: int  # pairs of frames from the same place that tell it; 0 if the robot never stood
 
 
 def fit_grain(measured: Pictures, predicted: NDArray[Any], floor: Flags) -> Grain:

@@ -109,18 +109,14 @@ APART_S = 10.0
 
 @dataclass(frozen=True)
 class Tracks:
-    """The poses of N frames, and those shortly before and after, on an axis of time on which drives follow each other.
+    """The poses of N frames, and those shortly before and after, on an axis of time where drives follow each other."""
 
-    There are K times [s] with poses (K, 3), unwrapped [m, rad], and their rates, 0 where pictures were taken standing
-    still; of each frame when it was taken and when its drive begins (N,) [s]. Smoothing leaves this `share` of scatter.
-    """
-
-    times: Floats
-    poses: Floats
-    rates: Floats
-    instants: Floats
-    begins: Floats
-    share: float
+    times: Floats  # (K,) [s]
+    poses: Floats  # (K, 3), unwrapped [m, rad]
+    rates: Floats  # of the poses, 0 where pictures were taken standing still
+    instants: Floats  # when each frame was taken (N,) [s]
+    begins: Floats  # when each frame's drive begins (N,) [s]
+    share: float  # of scatter that smoothing leaves
 
     def at(self, late_s: float) -> tuple[Floats, Floats]:
         """Poses and rates (N, 3) so long before each frame's instant."""
@@ -249,19 +245,15 @@ TILTED = 3
 
 @dataclass(frozen=True)
 class Views:
-    """N pictures with n edge points, sorted by picture.
-
-    Scatter is standard deviations: of a tracked place [m] and heading [rad] after smoothing, and of where a line lies
-    from where the map has it [m].
-    """
+    """N pictures with n edge points, sorted by picture, and the scatter of what places them: standard deviations."""
 
     edges: Edges
     tracks: Tracks
     markings: Markings
     optics: Optics
-    position_m: float
-    heading_rad: float
-    tape_m: float
+    position_m: float  # of a tracked place after smoothing [m]
+    heading_rad: float  # of a tracked heading after smoothing [rad]
+    tape_m: float  # of where a line lies from where the map has it [m]
 
     @property
     def count(self) -> int:

@@ -40,15 +40,13 @@ class PictureError:
 
 
 def unseen_residuals(views: Views, state: State, names: Sequence[str]) -> Floats:
-    """Residuals of every edge point (n,) [pixel], by cameras that were fitted without its frame.
-
-    Poses of frames left out are fitted under the tracker's scatter. CAP_PX where no marking is near.
-    """
+    """Residuals of every edge point (n,) [pixel], by cameras that were fitted without its frame."""
     residuals = np.full(len(views.edges.row), CAP_PX)
     for fold in range(FOLDS):
         out = np.arange(views.count) % FOLDS == fold
         fit = fit_camera(views, state, names, SCALES, ~out)
         own = out[views.edges.frame]
+        # Poses of frames left out are fitted under the tracker's scatter.
         there = project(views, fit_poses(views, fit.state, out))
         residuals[own] = np.where(there.valid, np.clip(there.residual, -CAP_PX, CAP_PX), CAP_PX)[own]
     return residuals
@@ -186,11 +184,9 @@ def compare_brightness(
 
 
 def grey_differences(measured: Pictures, drawn: Pictures, floor: Flags, *, fixed_exposure: bool) -> Pictures:
-    """Absolute differences on the floor (n, floor pixels, 3) of pictures (n, rows, columns, 3) [grey levels].
-
-    Where exposure is not fixed, each is compared at its own brightness, which no model knows.
-    """
+    """Absolute differences on the floor (n, floor pixels, 3) of pictures (n, rows, columns, 3) [grey levels]."""
     measured, drawn = measured[:, floor], drawn[:, floor]
+    # Each is compared at its own brightness, which no model knows.
     if not fixed_exposure:
         ratios = measured.mean(axis=-1) / np.maximum(drawn.mean(axis=-1), 1.0)
         drawn = drawn * np.asarray(np.median(ratios, axis=1)[:, None, None], dtype=np.float32)
@@ -218,18 +214,14 @@ MATERIAL = 1.03
 
 @dataclass(frozen=True)
 class Weighed:
-    """A camera with those effects alone that matter: errors on unseen frames, before and after.
-
-    `ratios` are the errors without each named effect, dropped ones too, over that with all; `nats` what leaving it out
-    costs; `dropped` had evidence, and hardly change the error.
-    """
+    """A camera with those effects alone that matter."""
 
     named: CameraSelection
     with_dropped: CameraFit
-    pixels: Comparison
-    ratios: Mapping[str, float]
-    nats: Mapping[str, float]
-    dropped: tuple[str, ...]
+    pixels: Comparison  # errors on unseen frames, before and after
+    ratios: Mapping[str, float]  # errors without each named effect, dropped ones too, over that with all
+    nats: Mapping[str, float]  # what leaving each out costs
+    dropped: tuple[str, ...]  # effects that had evidence, and hardly change the error
 
 
 def weigh_effects(named: CameraSelection, seed: int) -> Weighed:

@@ -30,32 +30,24 @@ class Counted(NamedTuple):
     weight: Floats
 
 
-def robust_weight(residual: Floats, scale_px: float) -> Floats:
-    """Weights of Geman and McClure's loss: 1 at zero, none far beyond the scale."""
-    return np.asarray(1.0 / (1.0 + (residual / scale_px) ** 2) ** 2)
-
-
 def count_points(
     views: Views, there: model.Projection, scale_px: float, frames: Flags | None = None, least: float = LEAST_WEIGHT
 ) -> Counted:
-    """Weigh edge points of some frames by how far they lie from the map's markings; those of least weight are out."""
+    """Weigh edge points of some frames by Geman and McClure: 1 on the map's markings, none far beyond the scale."""
     valid = there.valid if frames is None else there.valid & frames[views.edges.frame]
-    weight = np.where(valid, robust_weight(there.residual, scale_px), 0.0)
+    weight = np.where(valid, 1.0 / (1.0 + (there.residual / scale_px) ** 2) ** 2, 0.0)
     rows = np.flatnonzero(weight >= least)
     return Counted(rows, EVIDENCE * weight[rows])
 
 
 class Marginal(NamedTuple):
-    """Normal equations of the common columns with every frame's pose eliminated: of each its block's inverse (N, 3, 3).
-
-    `coupling` is how poses follow the common columns (N, 3, columns), `own` where they would go by themselves (N, 3).
-    """
+    """Normal equations of the common columns with every frame's pose eliminated."""
 
     matrix: Floats
     right: Floats
-    inverse: Floats
-    coupling: Floats
-    own: Floats
+    inverse: Floats  # of each pose's block (N, 3, 3)
+    coupling: Floats  # how poses follow the common columns (N, 3, columns)
+    own: Floats  # where poses would go by themselves (N, 3)
 
 
 def eliminate_poses(

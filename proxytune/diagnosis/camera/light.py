@@ -54,17 +54,16 @@ class Fitted:
 
 @dataclass(frozen=True)
 class Light:
-    """The light by which a drawn grey x is logged as 255 · gain · (x (1 − vignetting r²) / 255) ** gamma.
+    """The light that logs a drawn grey x as 255 · gain · (x (1 − vignetting r²) / 255) ** gamma; r is 1 in corners.
 
-    r is the distance from the picture's middle, 1 in its corners. Gain (`levels` are each frame's over it) and gamma
-    are relative to the declared paint: they make the drawn frames match, and say little of the camera where the paint
-    is not known. Vignetting, a share, does not depend on the paint.
+    Gain and gamma are relative to the declared paint: they make the drawn frames match, and say little of the camera
+    where the paint is not known.
     """
 
     gain: Fitted
     gamma: Fitted
-    vignetting: Fitted
-    levels: Floats
+    vignetting: Fitted  # a share, which does not depend on the paint
+    levels: Floats  # each frame's gain over that of all
 
     def shine(self, predicted: NDArray[Any]) -> NDArray[np.float32]:
         """Give what a camera of this light logs of drawn frames (N, rows, columns[, colours]), before it is rounded."""
@@ -289,10 +288,7 @@ def _against_usual(contrast: Singles) -> Singles:
 def _contrast(
     measured: Pictures, predicted: NDArray[Any], floor: Flags, light: Light, fewest: int = FEWEST_FRAMES
 ) -> tuple[Singles, Singles, Singles]:
-    """Regress the measured brightness of each window on the expected one over the frames; NaN if unknown.
-
-    Gives slopes, their standard errors, and the standard deviations of the measured over those of the expected.
-    """
+    """Slopes of measured on expected brightness of all windows, their errors, ratios of deviations; NaN if unknown."""
     green = np.ascontiguousarray(predicted[..., 1], dtype=np.float32)
     level = light.levels.astype(np.float32)[:, None, None]
     expected, logged = (

@@ -36,24 +36,18 @@ class State:
 
 
 class Projection(NamedTuple):
-    """Edge points on the floor (n), and the nearest markings of the map, of which `residual` is the distance [pixel].
+    """Edge points on the floor (n), and the nearest markings of the map."""
 
-    It changes by `slope` with the place on the floor (n, 2) [pixel/m]. `near` are points on the floor, near enough, by
-    a marking wide enough; `valid` those where besides the map's edge runs as the picture's does. Place, and lever from
-    the robot to it (n, 2) [m], are in the world; heading and rates are of the robot's pose (n,) [rad], (n, 3), and a
-    pixel on the floor along the edge's normal is so many metres (n,).
-    """
-
-    residual: Floats
-    near: Flags
-    valid: Flags
-    slope: Floats
-    lever: Floats
-    place: Floats
-    heading: Floats
-    metres: Floats
+    residual: Floats  # distance of the marking [pixel]
+    near: Flags  # whether it is on the floor, near enough, by a marking wide enough
+    valid: Flags  # whether besides the map's edge runs as the picture's does
+    slope: Floats  # change of the residual with the place on the floor (n, 2) [pixel/m]
+    lever: Floats  # from the robot to the place, in the world (n, 2) [m]
+    place: Floats  # in the world (n, 2) [m]
+    heading: Floats  # of the robot [rad]
+    metres: Floats  # of a pixel on the floor along the edge's normal
     marks: Marks
-    rates: Floats
+    rates: Floats  # of the robot's pose (n, 3)
 
 
 def neutral_state(views: Views, theta: Mapping[str, float]) -> State:

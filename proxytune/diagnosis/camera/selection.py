@@ -86,19 +86,14 @@ RIVAL_NATS = 3.0
 
 @dataclass(frozen=True)
 class CameraSelection:
-    """The effects that a camera was found to need besides those declared, and what each explains by itself [nats].
+    """The effects that a camera was found to need besides those declared."""
 
-    Fits are with the declared effects alone, with those that are needed besides, and with every effect of the
-    catalogue; `losses` of the best set of each size, that of all effects being 0 [nats]. Rivals do as well.
-    """
-
-    declared: CameraFit
-    model: CameraFit
-    full: CameraFit
+    declared: CameraFit  # with the declared effects alone
+    model: CameraFit  # with those that are needed besides
+    full: CameraFit  # with every effect of the catalogue
     effects: tuple[str, ...]
-    losses: tuple[Subset, ...]
-    alone: tuple[Subset, ...]
-    rivals: tuple[tuple[str, ...], ...]
+    alone: tuple[Subset, ...]  # what each effect explains by itself [nats]
+    rivals: tuple[tuple[str, ...], ...]  # sets of effects that do as well
 
 
 def fit_everything(views: Views, names: Sequence[str], fixed: Mapping[str, float], *, learn_scatter: bool) -> CameraFit:
@@ -118,8 +113,7 @@ def select_camera_effects(full: CameraFit, declared: Sequence[str]) -> CameraSel
     """Find the fewest effects besides those declared that explain what all together do."""
     least = cost_of(full)
     enough = max(LEAST_NATS, LEAST_SHARE * least)
-    best: list[tuple[Subset, CameraFit]] = []
-    rivals: list[Subset] = []
+    fits: list[CameraFit] = []
     for size in range(MOST + 1):
         sets = rank_subsets(full, declared, size)[:TRIED]
         if not sets:
@@ -127,16 +121,13 @@ def select_camera_effects(full: CameraFit, declared: Sequence[str]) -> CameraSel
         tried = [(one, fit_set(full, (*declared, *one.effects))) for one in sets]
         # A set may really cost less beyond the full fit than was promised.
         costs = [(Subset(one.effects, min(one.loss, cost_of(fit) - least)), fit) for one, fit in tried]
-        fits = sorted(costs, key=lambda pair: pair[0].loss)
-        best.append(fits[0])
-        rivals = [one for one, _ in fits[1:] if one.loss <= fits[0][0].loss + RIVAL_NATS]
-        if fits[0][0].loss <= enough:
+        (best, fit), *others = sorted(costs, key=lambda pair: pair[0].loss)
+        fits.append(fit)
+        rivals = tuple(one.effects for one, _ in others if one.loss <= best.loss + RIVAL_NATS)
+        if best.loss <= enough:
             break
-    subset, model = best[-1]
-    losses, others = tuple(one for one, _ in best), tuple(one.effects for one in rivals)
-    return CameraSelection(
-        best[0][1], model, full, subset.effects, losses, tuple(rank_subsets(full, declared, 1)), others
-    )
+    alone = tuple(rank_subsets(full, declared, 1))
+    return CameraSelection(fits[0], fits[-1], full, best.effects, alone, rivals)
 
 
 def cost_of(fit: CameraFit) -> float:
@@ -190,10 +181,7 @@ class ResidualField:
 
 
 def fit_residual_field(fit: CameraFit) -> ResidualField:
-    """Fit the field to one half of the frames and test it on the other, both ways.
-
-    What the free parameters, the tape, the map and the poses could explain is left to them.
-    """
+    """Fit the field that all else leaves over to one half of the frames and test it on the other, both ways."""
     there = project(fit.views, fit.state)
     halves = [np.arange(fit.views.count) % 2 == part for part in (0, 1)]
     systems = [_system(fit, there, half) for half in halves]

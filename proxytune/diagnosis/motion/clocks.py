@@ -149,10 +149,7 @@ def read_clocks(log: Log, robot: Robot, like: Clocks | None = None) -> Clocks:
 
 
 def put_on_one_clock(log: Log, clocks: Clocks) -> Log:
-    """Put commands on the poses' clock, and leave out poses beyond a jump or before the first command.
-
-    Poses keep their times: it is what a declared offset does.
-    """
+    """Put commands on the clock of poses, which keep it, and leave out poses beyond a jump or before all commands."""
     if not clocks.differ:
         return log
 
@@ -332,10 +329,7 @@ class Parts(NamedTuple):
 
 
 def split(log: Log, robot: Robot, test: Log | None) -> Parts:
-    """Keep every third episode to test on, or the second half of each where there are few, or another log.
-
-    Refused if there is too little to fit or to test on.
-    """
+    """Keep every third episode to test on, of few the second half of each, or another log; too little is refused."""
     if test is not None:
         parts = Parts(*(gather(one, robot, one.episodes) for one in (log, test)))
     elif len(log.episodes) >= FEWEST_EPISODES:

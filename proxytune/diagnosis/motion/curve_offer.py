@@ -96,7 +96,9 @@ def offer_curves(drives: Drives, theta: Theta) -> Learnt:
             "ended": ENDED_S,
             "ramped": tuple(product(RAMPS_S, RAMPS_S))[1:],
         }
-    if not _in_frames_of_their_own(drives):
+    # Where several drives begin in motion at one and the same place, each counts places from where it begins.
+    begun = drives.places[drives.rest.any(axis=1), 0]
+    if not (len(begun) > 1 and np.ptp(begun, axis=0).max() < SAME_PLACE_M):
         places = drives.places[used]
         knots[PLACE] = _lattice(places, MOST_CORNERS)
         for number, axis in enumerate("xy"):
@@ -109,12 +111,6 @@ def offer_curves(drives: Drives, theta: Theta) -> Learnt:
         if knots.get(group)
     ]
     return Learnt(FittedRange(_ends(forward), _ends(yaw)), tuple(curves))
-
-
-def _in_frames_of_their_own(drives: Drives) -> bool:
-    """Tell whether each drive counts places from where it begins: several begin in motion at one and the same place."""
-    begun = drives.places[drives.rest.any(axis=1), 0]
-    return len(begun) > 1 and bool(np.ptp(begun, axis=0).max() < SAME_PLACE_M)
 
 
 def _lattice(places: Floats, most: int) -> Knots:

@@ -42,16 +42,13 @@ MAIN_S = 2.0
 
 
 class Bracket(NamedTuple):
-    """The two errors between which that of a right model lies [m], the lower one of the noise of measured poses alone.
+    """The two errors between which that of a right model lies [m]."""
 
-    The upper one is what a right model might have by chance where this was the lowest error that any model reached,
-    less what drives from the same commands repeat of it, if there are any.
-    """
-
-    lower: float
+    lower: float  # what the noise of measured poses alone makes
+    # what a right model might have by chance where `reached` was the lowest, less what drives repeat of it
     upper: float
-    reached: float
-    again: prediction.Repeated | None
+    reached: float  # the lowest error that any model reached
+    again: prediction.Repeated | None  # what drives from the same commands do not repeat, if there are any
 
     @property
     def least(self) -> float:
@@ -209,10 +206,7 @@ class Diagnosis:
         }
 
     def at_edge(self, effect: AdoptedEffect) -> tuple[str, ...]:
-        """Parameters of an effect, by name in θ, that were fitted to an end of their range which is not neutral.
-
-        The effect then stands for something else.
-        """
+        """Names in θ of an effect's values at an end that is not neutral: the effect then stands for something else."""
         return _at_edge({name: one.value for name, one in self.theta.items()}, effect, self.found.model.drives)
 
     @property

@@ -25,10 +25,8 @@ from proxytune.settings import GEOMETRY, nearest
 
 
 def cosine_and_sine(angle: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
-    """The cosine and the sine of angles (…,) [rad].
-
-    Both come from the tangent of half the angle: of that numpy has a fast form on many processors, of them none.
-    """
+    """The cosine and the sine of angles (…,) [rad]."""
+    # Of the tangent numpy has a fast form on many processors, of cosine and sine none.
     tangent = np.tan(0.5 * angle)
     square = tangent * tangent
     share = 1.0 / (1.0 + square)
@@ -118,15 +116,12 @@ def commands_as(kind: str, robot: Robot, duties: Floats) -> Floats:
 
 
 class Commands(NamedTuple):
-    """An episode's commands (M, 2), as fractions of full speed; times [s] count from the first sample.
+    """An episode's commands (M, 2), as fractions of full speed."""
 
-    `rest` was in force before it; `ticks_each` is how long each lasts where commands go with the samples, else 0.
-    """
-
-    times: Floats
+    times: Floats  # from the first sample on [s]
     duties: Floats
-    rest: Floats
-    ticks_each: int
+    rest: Floats  # what was in force before the first sample
+    ticks_each: int  # how long each lasts where commands go with the samples, else 0
 
     def over_ticks(self, length: int, tick_hz: float) -> Floats:
         """The mean of the command in force over each tick (length, 2); each is held from its own time."""
@@ -157,12 +152,6 @@ def commands_of(log: Log, robot: Robot, episode: LogEpisode, ticks: int) -> Comm
     times = episode.issued - episode.times[0]
     before = np.flatnonzero(times < -1e-9)
     return Commands(times, duties, duties[before[-1]] if len(before) and episode.wheels is None else rest, 0)
-
-
-def commands_a_second(log: Log, episodes: Sequence[LogEpisode]) -> float:
-    """Commands a second: one a sample, or one at the usual interval between their own times."""
-    between = [np.diff(e.issued) for e in episodes if e.issued is not None and len(e.issued) > 1]
-    return 1.0 / float(np.median(np.concatenate(between))) if between else log.rate_hz
 
 
 Whole = NDArray[Any]
@@ -321,10 +310,7 @@ def relative(origin: Floats, pose: Floats) -> Floats:
 
 
 def gather(log: Log, robot: Robot, episodes: Sequence[LogEpisode], *, compared: bool = True) -> Drives:
-    """A batch of a log's episodes, each command held from its own time; `compared` ones need measured motion.
-
-    Poses that lie off the way for a sample or two are left out.
-    """
+    """A batch of a log's episodes without poses that lie off the way for a sample or two; `compared` ones must move."""
     episodes = [without_outliers(episode) for episode in episodes]
     # A measured rate of 59.9998 Hz is 60 Hz: twice the ticks would tell nothing more. Published results of robots on
     # two wheels were got without slack, and stay what they are.
@@ -339,11 +325,13 @@ def gather(log: Log, robot: Robot, episodes: Sequence[LogEpisode], *, compared: 
     if compared and len(rows) == 0:
         raise LogError(f"{log.name}: no two measured poses in a row; nothing can be learnt from it")
     poses, after = ends_of(episodes, samples)
+    # Commands come with the samples, or at times of their own.
+    between = [np.diff(e.issued) for e in episodes if e.issued is not None and len(e.issued) > 1]
     linked = np.concatenate(([False], (number[1:] == number[:-1]) & (rows[1:, 0] == rows[:-1, 1])))[: len(rows)]
     drives = Drives(
         robot=robot,
         tick_hz=tick_hz,
-        rate_hz=commands_a_second(log, episodes),
+        rate_hz=1.0 / float(np.median(np.concatenate(between))) if between else log.rate_hz,
         duties=np.stack([one.over_ticks(length, tick_hz) for one in given]),
         issued=np.stack([one.ticks(length, tick_hz) for one in given]),
         rest=np.stack([_at_start(one, e, s, robot) for one, e, s in zip(given, episodes, samples, strict=True)]),

@@ -58,17 +58,14 @@ class WeighedEffect(NamedTuple):
 
 
 def drop_negligible(found: Findings, seed: int, aside: Drives | None = None) -> Findings:
-    """Drop the effects that are negligible for prediction, the weakest first.
-
-    On drives kept aside what is not shown to be worth anything is dropped. Without them effects are weighed on the
-    fitted drives, and have to be material.
-    """
+    """Drop the effects that are negligible for prediction, the weakest first."""
     drives = found.model.drives
     variant, kept = Variant(found.model.theta, found.model.free), list(found.adopted)
     dropped: list[DroppedEffect] = []
     while kept and multistep_fit.horizons(drives) and (aside is None or multistep_fit.horizons(aside)):
         sizes = measure_effect_sizes(found.model, aside, variant, kept, seed)
         weighed = [WeighedEffect(effect, size, drives.rules) for effect, size in zip(kept, sizes, strict=True)]
+        # On drives kept aside anything that is shown will do; on those that were fitted effects have to be material.
         worth = [one.material if aside is None else any(size.above for size in one.size.values()) for one in weighed]
         negligible = [one for one, needed in zip(weighed, worth, strict=True) if not needed]
         weakest = min(negligible, key=lambda one: max(size.value for size in one.size.values()), default=None)
@@ -86,10 +83,7 @@ def drop_negligible(found: Findings, seed: int, aside: Drives | None = None) -> 
 def measure_effect_sizes(
     model: Fit, tested: Drives | None, variant: Variant, effects: Iterable[AdoptedEffect], seed: int
 ) -> list[EffectSize]:
-    """Measure the error without each effect by the error with all, on drives that nothing was fitted to.
-
-    Without such drives it is measured on those that were fitted, with blocks left out in turn.
-    """
+    """Measure the error without each effect by that with all, on other drives, else with blocks left out in turn."""
     drives, rate_hz = model.drives if tested is None else tested, model.drives.rate_hz
 
     def squares(one: Variant) -> dict[float, Floats]:
@@ -116,15 +110,12 @@ def _squares(model: Fit, tested: Drives, variant: Variant) -> dict[float, Floats
 
 
 def _held_out(model: Fit, variant: Variant) -> tuple[Theta | None, dict[float, Floats]]:
-    """Squared held-out errors of a variant of a model that is fitted to windows, by horizon [s].
-
-    The many parameters of a car wander when they are fitted to windows. Where its θ that is fitted to single steps
-    predicts better, that is given too, with its errors.
-    """
+    """Squared held-out errors by horizon [s] of a variant fitted to windows, or to steps, with that θ, if better."""
     drives, length = model.drives, _length(model.drives)
     windows = multistep_fit.held_out_squares(drives, variant.theta, variant.free, length)
     if drives.robot.drive != "ackermann" or not windows:
         return None, windows
+    # The many parameters of a car wander when they are fitted to windows.
     theta = fit(drives, variant.theta, variant.free, model.noise).theta
     steps = multistep_fit.squared_errors(drives, theta)
     return (theta, steps) if steps[length].mean() < windows[length].mean() else (None, windows)
@@ -136,10 +127,7 @@ def _length(drives: Drives) -> float:
 
 
 def _size_of_draws(drives: Drives, variant: Variant, whole: Mapping[float, Floats], seed: int) -> dict[float, Ratio]:
-    """The size of a random effect: how much of the error its draws make up.
-
-    What is left cannot be below what the noise of poses makes alone: draws that would leave less are not in the data.
-    """
+    """The size of a random effect: how much of the error its draws make up."""
     found, noise = {}, multistep_fit.pose_noise(drives, variant.theta)
     for horizon, squares in whole.items():
         windows = cut(drives, horizon)
@@ -148,6 +136,7 @@ def _size_of_draws(drives: Drives, variant: Variant, whole: Mapping[float, Float
         error = rmse(squares, blocks)
         sizes = []
         for drawn, most in zip((share.value, *share.interval), (error.value, *error.interval), strict=True):
+            # Draws that would leave less than what the noise of poses makes alone are not in the data.
             room = float(np.sqrt(max(0.0, 1.0 - (floor / most) ** 2))) if most > 0.0 else 0.0
             sizes.append(float(1.0 / np.sqrt(1.0 - min(min(drawn, room), LARGEST_SHARE) ** 2)))
         found[horizon] = Ratio(sizes[0], (sizes[1], sizes[2]))
@@ -204,10 +193,7 @@ class RobotClusters(NamedTuple):
 
 
 def find_robot_clusters(drives: Drives, model: Fit) -> RobotClusters | None:
-    """Find the two groups that drives fall in by a wheel's gain, None where they are all alike.
-
-    Effects of one robot that a model lacks spread the drives' gains too, but do not leave a gap between two groups.
-    """
+    """Find the two groups that drives fall in by a wheel's gain, None where they are all alike."""
     episodes = np.unique(drives.episode)
     if len(episodes) < 2 * drives.rules.robot_drives:
         return None
@@ -215,6 +201,7 @@ def find_robot_clusters(drives: Drives, model: Fit) -> RobotClusters | None:
     gains, deviations = np.concatenate([_own_gains(drives.some(batch), model) for batch in batches], axis=1)
     found = [_groups(episodes, gains[:, side], deviations[:, side], drives.rules) for side in range(2)]
     clearest, side = max(((clear, side) for side, (clear, _) in enumerate(found)), key=lambda pair: pair[0])
+    # Effects of one robot that a model lacks spread the gains too, but leave no gap between two groups.
     if clearest < 1.0:
         return None
     groups = found[side][1]

@@ -237,10 +237,7 @@ class Rivals:
 
 
 def nats_apart(model: Fit, batch: Drives, rival: Variant) -> Floats:
-    """Evidence of each imagined drive against a rival near its fit [nats] (E,).
-
-    It is n/2 log(1 + 2 T / n) with n innovations, for the rival's noise is fitted too and takes up a part.
-    """
+    """Evidence of each imagined drive against a rival near its fit [nats] (E,)."""
     count, whiten = len(batch.duties), whitener(batch, model.noise)
     left = whiten.whiten(batch.measured - increments(batch, rival.theta)).reshape(count, -1)
     columns = slopes(batch, rival.theta, rival.free, whiten).reshape(*left.shape, -1)
@@ -249,6 +246,7 @@ def nats_apart(model: Fit, batch: Drives, rival: Variant) -> Floats:
     along = np.einsum("enc,en->ec", columns, left)
     explained = np.einsum("ec,ec->e", along, np.linalg.solve(gram, along[..., None])[..., 0])
     apart = np.maximum(0.0, np.einsum("en,en->e", left, left) - explained)
+    # It is n/2 log(1 + 2 T / n) with n innovations, for the rival's noise is fitted too and takes up a part.
     return np.asarray(0.5 * left.shape[1] * np.log1p(apart / left.shape[1]))
 
 

@@ -64,10 +64,8 @@ class Fit:
 
 
 def fit(drives: Drives, theta: Theta, free: tuple[Coordinate, ...], noise: Noise = FIRST_GUESS) -> Fit:
-    """Fit free coordinates from where θ has them, in rounds of parameters and noise.
-
-    Within a round the filter's gains are frozen: otherwise flat gains would pass for evidence.
-    """
+    """Fit free coordinates from where θ has them, in rounds of parameters and noise."""
+    # Within a round the filter's gains are frozen: otherwise flat gains would pass for evidence.
     for number in range(ROUNDS):
         theta = fit_theta(drives, theta, free, whitener(drives, noise), SCANS[min(number, len(SCANS) - 1)])
         noise = fit_noise(drives, drives.measured - increments(drives, theta), noise)
@@ -84,10 +82,7 @@ def evaluate(drives: Drives, theta: Theta, free: tuple[Coordinate, ...], noise: 
 def fit_theta(
     drives: Drives, theta: Theta, free: tuple[Coordinate, ...], whiten: Whitener, multiples: Floats = SCANS[0]
 ) -> Theta:
-    """Fit free coordinates from where θ has them under frozen gains; those that change the motion by steps first.
-
-    Those are looked for at multiples of their value.
-    """
+    """Fit free coordinates from where θ has them, gains frozen, those of steps first, at multiples of their values."""
     sloped = smooth_coordinates(free, drives.robot)
     rough = tuple(coordinate for coordinate in free if coordinate not in sloped)
     return _fit_sloped(drives, _scan(drives, theta, rough, whiten, multiples), sloped, whiten)
@@ -112,14 +107,11 @@ def _fit_sloped(drives: Drives, theta: Theta, free: tuple[Coordinate, ...], whit
 
 
 def _scan(drives: Drives, theta: Theta, rough: tuple[Coordinate, ...], whiten: Whitener, multiples: Floats) -> Theta:
-    """Scan for the best value of each coordinate in which the motion changes by steps, all others held.
-
-    Round numbers near by are looked at first: people set thresholds and steps to them, and a duty that lies just on one
-    goes the other way at a value a hair beside it.
-    """
+    """Scan for the best value of each coordinate in which the motion changes by steps, all others held."""
     for coordinate in rough:
         low, high = span(coordinate, drives)
         here = theta[coordinate[0]]
+        # People set thresholds and steps to round numbers, and a duty just on one goes the other way a hair beside it.
         round_numbers = [float(f"{here:.{figures}g}") for figures in (1, 2, 3)]
         values = np.clip(np.concatenate((round_numbers, [here], here * multiples)), low, high)
         losses = [loss_of(drives, theta_at(theta, (coordinate,), np.array([value])), whiten) for value in values]
@@ -133,16 +125,14 @@ def loss_of(drives: Drives, theta: Theta, whiten: Whitener) -> float:
 
 
 def slopes(drives: Drives, theta: Theta, free: tuple[Coordinate, ...], whiten: Whitener) -> Floats:
-    """Differentiate the innovations by each coordinate, as a fraction of its range (3N, coordinates).
-
-    It is 0 along coordinates that change the motion by steps: the slope there says nothing of the next step.
-    """
+    """Differentiate the innovations by each coordinate, as a fraction of its range (3N, coordinates)."""
     if not free:
         return np.empty((3 * len(drives.episode), 0))
     here = increments(drives, theta)
     columns = []
     for coordinate in free:
         if is_stepwise(coordinate, drives.robot):
+            # The slope there says nothing of the next step.
             columns.append(np.zeros_like(here))
             continue
         there, step = nudged(drives, theta, coordinate, STEP)
@@ -156,10 +146,7 @@ def sum_by_block(drives: Drives, values: Floats) -> Floats:
 
 
 def held_out_log_likelihood(fitted: Fit) -> Floats:
-    """Each block's log-likelihood under the model fitted to all others (blocks,), in nats.
-
-    Leaving a block out moves the parameters by one Newton step.
-    """
+    """Each block's log-likelihood under the model fitted to all others, a Newton step away (blocks,) [nats]."""
     sums = derivatives_by_block(fitted, fitted.slopes)
     shifted = held_out_innovations(fitted, fitted.slopes, sums, KEPT_SOLVABLE * np.eye(fitted.slopes.shape[1]))
     loss = huber(shifted).reshape(-1, 3).sum(axis=1) + fitted.whiten.log_determinant

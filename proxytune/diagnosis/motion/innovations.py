@@ -166,17 +166,14 @@ def _by_numba() -> ModuleType | None:
 
 
 def fit_noise(drives: Drives, errors: Floats, start: Noise) -> Noise:
-    """The noise under which errors (N, 3) are likeliest, looked for from `start` and from FIRST_GUESS.
-
-    A start from a model that misses much can end where all noise is too large. Of long drives a part is taken, the same
-    for every model.
-    """
+    """The noise under which errors (N, 3) are likeliest, looked for from `start` and from FIRST_GUESS."""
     # Multiples of the golden ratio spread runs evenly whatever their number, in step with nothing that drives repeat.
     number = np.arange(len(errors)) // RUN
     kept = np.asarray(number * 0.6180339887 % 1.0 < THINNED / max(len(errors), 1))
     if not kept.all():
         drives, errors = drives.only(kept), errors[kept]
     parts = np.stack([_covariance(drives, unit) for unit in np.eye(5)])
+    # A start from a model that misses much can end where all noise is too large.
     found = [_fit_noise(parts, errors, noise) for noise in dict.fromkeys((start, FIRST_GUESS))]
     return min(found, key=lambda pair: pair[0])[1]
 
@@ -343,10 +340,7 @@ def window_paths(drives: Drives, theta: Theta, begin: Whole, length: int) -> Flo
 
 
 def window_twists(drives: Drives, theta: Theta, begin: Whole, length: int, added: Floats | None = None) -> Floats:
-    """The motion that a model asks of the plant in such windows (W, length, 3): [m/s], [m/s], [rad/s].
-
-    Something may be added to the commands that arrive (E, T, 2).
-    """
+    """The motion asked of the plant in such windows (W, length, 3), with what is `added` to commands (E, T, 2)."""
     train, _ = _model(drives, theta)
     whole, wheels = _window_wheels(drives, theta, begin, length, added)
     if not train.motion.effects:
@@ -380,18 +374,13 @@ LearntMotion = list[tuple[Floats, Floats]]
 
 
 def window_features(drives: Drives, theta: Theta, learnt: Learnt, begin: Whole, length: int) -> Iterator[LearntMotion]:
-    """Motion that each weight of a learnt effect beside a model adds in such windows, but those over commands."""
-    whole = twists_of(drives, theta)
+    """Motion that each weight of a learnt effect beside a model adds in such windows, those over commands last."""
+    whole, asked = twists_of(drives, theta), window_twists(drives, theta, begin, length)
     past = learnt.recall(_window_setting(drives, begin, whole), whole, drives.episode[begin], drives.first[begin])
-    yield from ([one] for one in learnt.features(window_twists(drives, theta, begin, length), past))
-
-
-def window_command_features(
-    drives: Drives, theta: Theta, learnt: Learnt, begin: Whole, length: int
-) -> Iterator[LearntMotion]:
-    """Motion that each weight over commands adds in such windows: every one is a replay of the drives."""
-    arrived, asked = arrived_commands(drives, theta), window_twists(drives, theta, begin, length)
-    for features in learnt.commands.features(arrived, learnt.commands.begin(_setting(drives))):
+    yield from ([one] for one in learnt.features(asked, past))
+    # Every weight over commands is a replay of the drives.
+    arrived, before = arrived_commands(drives, theta), learnt.commands.begin(_setting(drives))
+    for features in learnt.commands.features(arrived, before):
         moved = np.empty((3, features.shape[-1], *asked.shape[:2]))
         for number, column in enumerate(np.moveaxis(features, -1, 0)):
             twists = window_twists(drives, theta, begin, length, SMALL_DUTY * column)

@@ -47,17 +47,13 @@ class Speeds(NamedTuple):
 
 
 class Reaction(NamedTuple):
-    """The linear, first-order robot that follows its commands best: what latency lies beyond the motor's lag [s].
+    """The linear, first-order robot that follows its commands best."""
 
-    Gains go from commanded to measured forward speed and yaw rate (2, 2); `spread` is the deviation of what it leaves
-    of either, `squares` what it leaves of each span (M,), in units of the whole log's.
-    """
-
-    latency_s: float
+    latency_s: float  # what latency lies beyond the motor's lag [s]
     time_constant_s: float
-    gains: Floats
-    spread: Floats
-    squares: Floats
+    gains: Floats  # from commanded to measured forward speed and yaw rate (2, 2)
+    spread: Floats  # deviation of what it leaves of either
+    squares: Floats  # what it leaves of each span (M,), in units of the whole log's
 
 
 class Latency(NamedTuple):
@@ -193,15 +189,13 @@ def _misfit(found: Reaction) -> float:
 
 
 def squares_by_latency(drives: Drives, speeds: Speeds, robot: Reaction, latencies: Floats, ends: Whole) -> Floats:
-    """Squares that this reaction leaves of each span at each latency (M, latencies), in its own variances.
-
-    Where the commands had ended, at tick `ends` (E,), nothing speaks for or against a latency.
-    """
+    """Squares that this reaction leaves of each span at each latency (M, latencies), up to the ticks `ends` (E,)."""
     commanded = _CommandedSpeeds(drives, float(np.abs(latencies).max()))
     asked = commanded.speeds(speeds, [robot.latency_s, *latencies.tolist()], robot.time_constant_s)
     usual = _squares(speeds, robot, asked[0])
     left = np.empty((len(speeds.episode), len(latencies)))
     for number, latency in enumerate(latencies):
+        # Where the commands had ended, nothing speaks for or against a latency.
         known = speeds.last - latency * drives.tick_hz <= ends[speeds.episode]
         left[:, number] = np.where(known, _squares(speeds, robot, asked[number + 1]), usual)
     return left
@@ -213,15 +207,12 @@ def _squares(speeds: Speeds, robot: Reaction, asked: Floats) -> Floats:
 
 
 def likeliest_latency(squares: Floats, latencies: Floats) -> Latency:
-    """The latency at which squares summed over blocks (blocks, latencies) are least.
-
-    Its deviation is that of the blocks' slopes there over the curvature; infinite where nothing tells it, as at either
-    end: a robot that is stuck is as if its commands came long after.
-    """
+    """The latency at which squares summed over blocks (blocks, latencies) are least."""
     total = squares.sum(axis=0)
     least = int(total.argmin())
     middle = int(np.clip(least, 1, len(total) - 2))
     curve = float(total[middle - 1] - 2.0 * total[middle] + total[middle + 1])
+    # Nothing tells it, as at either end: a robot that is stuck is as if its commands came long after.
     if curve <= 0.0 or least != middle:
         return Latency(float(latencies[middle]), float("inf"))
     slopes = (squares[:, middle + 1] - squares[:, middle - 1]) / 2.0
@@ -297,12 +288,7 @@ class Drift(NamedTuple):
 
 
 def clock_drift(blocks: Blocks, times: Floats, latencies: Floats) -> Drift | None:
-    """The rate at which latency grows over a log, one for all its drives; None where nothing tells it.
-
-    A grid of rates is looked through, and Gauss-Newton steps lead on from its best. Its deviation is that of the slopes
-    of pieces of the drives: where a part of them alone grows late, their robot or their own clock does.
-    `times` are the middles of the blocks in the log's time (B,) [s].
-    """
+    """The rate at which latency grows over a log, its blocks' middles at `times` (B,) [s]; None where nothing tells."""
     middle, step = times - times.mean(), float(latencies[1] - latencies[0])
     span = float(np.ptp(times))
     if span <= 0.0:
@@ -322,6 +308,7 @@ def clock_drift(blocks: Blocks, times: Floats, latencies: Floats) -> Drift | Non
         slopes = (squares[:, at + 1] - squares[:, at - 1]) / (2.0 * step)
         further = -float(slopes @ middle) / (curve * float(middle @ middle))
         rate += further
+    # Where a part of the drives alone grows late, their robot or their own clock does.
     _, label = np.unique(blocks.episode * len(times) + blocks.number // PIECE, return_inverse=True)
     votes = np.bincount(label, (slopes - slopes.mean() + curve * further * middle) * middle)
     if len(votes) < FEWEST_PIECES:
@@ -364,11 +351,9 @@ class Step(NamedTuple):
 
 
 def _steps(log: Log) -> list[list[Step]]:
-    """The clearest step of each block of each drive: a clock that jumps puts moving poses on or back between samples.
-
-    The way round it is a parabola over time; the step is as long as a jump's where way and turn have the same one.
-    """
+    """The clearest step of each drive's blocks: a clock that jumps puts moving poses on or back between samples."""
     count = max(3, round(STEP_SPAN_S * log.rate_hz))
+    # The way round a step is a parabola over time; a jump's step is as long in way and turn.
     at = np.arange(1 - count, count + 1) - 0.5
     parabola = np.linalg.pinv(np.stack((np.ones(2 * count), at, at**2, at > 0.0), axis=1))
     # From ways by samples to the increments between them.
@@ -451,13 +436,11 @@ def _jump_at_a_step(drive: Blocks, latencies: Floats, steps: Sequence[Step], usu
 
 
 def _all_jumps(squares: Floats, latencies: Floats, usual: float | None) -> list[tuple[int, float]]:
-    """The jumps of a drive; small ones alone where none is found among all.
-
-    What a robot does in its last seconds may look like something that it did long before.
-    """
+    """The jumps of a drive; small ones alone where none is found among all."""
     found = _jumps(squares, latencies, MOST_JUMPS, usual)
     if found or not len(squares):
         return found
+    # What a robot does in its last seconds may look like something that it did long before.
     near = np.abs(latencies - latencies[int(squares.sum(axis=0).argmin())]) < FAR_S
     return _jumps(squares[:, near], latencies[near], MOST_JUMPS, usual)
 
@@ -504,12 +487,10 @@ def _is_jump(one: Latency, other: Latency, share: float, usual: float | None, *,
 
 
 def _share(squares: Floats, latencies: Floats, elsewhere: float) -> float:
-    """The share of what is left over at another latency that the best one takes away.
-
-    Far off, one block alone is no proof: a tracker may put its map right within it.
-    """
+    """The share of what is left over at another latency that the best one takes away."""
     best, other = int(squares.sum(axis=0).argmin()), int(np.abs(latencies - elsewhere).argmin())
     gained = squares[:, other] - squares[:, best]
+    # Far off, one block alone is no proof: a tracker may put its map right within it.
     kept = np.ones(len(squares), dtype=bool)
     kept[gained.argmax()] = abs(latencies[best] - elsewhere) < FAR_S
     return float(gained[kept].sum() / max(squares[kept, other].sum(), LEAST_SQUARES * kept.sum()))

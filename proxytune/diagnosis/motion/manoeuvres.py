@@ -8,58 +8,56 @@ from proxytune.diagnosis.motion.drives import Floats
 from proxytune.driving import Robot
 
 
-def _figure_eight(t: Floats) -> Floats:
-    return _wheels(np.full_like(t, 0.6), 0.25 * np.sign(np.sin(2 * np.pi * t / 12.0)))
-
-
-def _arcs(t: Floats) -> Floats:
-    return _wheels(0.3 + 0.15 * np.floor(t / 15.0), 0.08 * (1.0 + np.floor(t / 5.0) % 3) * np.sign(7.5 - t % 15.0))
-
-
-def _creeping(t: Floats) -> Floats:
-    return _wheels(0.25 * np.sin(2 * np.pi * t / 20.0), np.zeros_like(t))
-
-
-def _stop_and_go(t: Floats) -> Floats:
-    return _wheels(0.5 * (t % 2.0 < 1.0), 0.1 * np.sign(np.sin(2 * np.pi * t / 8.0)) * (t % 2.0 < 1.0))
-
-
-def _spins(t: Floats) -> Floats:
-    return _wheels(np.zeros_like(t), (0.2 + 0.15 * (np.floor(t / 10.0) % 3)) * np.sign(np.sin(2 * np.pi * t / 5.0)))
-
-
-def _reversals(t: Floats) -> Floats:
-    return _wheels(
-        (0.2 + 0.2 * (np.floor(t / 12.0) % 3)) * np.sign(np.sin(2 * np.pi * t / 3.0)), 0.05 * np.ones_like(t)
-    )
-
-
-def _full_speed(t: Floats) -> Floats:
-    return _wheels(np.where(t % 10.0 < 7.0, 1.0, 0.3), 0.1 * np.sign(np.sin(2 * np.pi * t / 14.0)) * (t % 10.0 >= 7.0))
-
-
-def _quick_steps(t: Floats) -> Floats:
-    forward = 0.4 + 0.3 * np.sign(np.sin(2 * np.pi * t / 0.7))
-    return _wheels(forward, 0.2 * np.sign(np.sin(2 * np.pi * t / 1.1)))
-
-
 def _wheels(forward: Floats, turn: Floats) -> Floats:
     return np.asarray(np.clip(np.stack((forward - turn, forward + turn), axis=-1), -1.0, 1.0))
 
 
+def _sides(t: Floats, period_s: float) -> Floats:
+    """1 and −1 in turn."""
+    return np.asarray(np.sign(np.sin(2 * np.pi * t / period_s)))
+
+
 LIBRARY: tuple[tuple[str, str, Callable[[Floats], Floats]], ...] = (
-    ("figure-eight", "figures of eight at a middling speed, six seconds a side", _figure_eight),
-    ("arcs", "steady arcs of three radii at four speeds", _arcs),
+    (
+        "figure-eight",
+        "figures of eight at a middling speed, six seconds a side",
+        lambda t: _wheels(np.full_like(t, 0.6), 0.25 * _sides(t, 12.0)),
+    ),
+    (
+        "arcs",
+        "steady arcs of three radii at four speeds",
+        lambda t: _wheels(0.3 + 0.15 * (t // 15.0), 0.08 * (1.0 + t // 5.0 % 3) * np.sign(7.5 - t % 15.0)),
+    ),
     (
         "creeping",
         "straight, the command rising and falling slowly through zero, a quarter of full speed at most",
-        _creeping,
+        lambda t: _wheels(0.25 * np.sin(2 * np.pi * t / 20.0), np.zeros_like(t)),
     ),
-    ("stop and go", "a second of driving, a second of rest, bending left and right in turn", _stop_and_go),
-    ("spins", "turns on the spot, both ways, at three speeds", _spins),
-    ("reversals", "forwards and backwards in turn every second and a half, at three speeds", _reversals),
-    ("full speed", "long straights at full command, short slow bends between them", _full_speed),
-    ("quick steps", "commands that jump about twice a second", _quick_steps),
+    (
+        "stop and go",
+        "a second of driving, a second of rest, bending left and right in turn",
+        lambda t: _wheels(0.5 * (t % 2.0 < 1.0), 0.1 * _sides(t, 8.0) * (t % 2.0 < 1.0)),
+    ),
+    (
+        "spins",
+        "turns on the spot, both ways, at three speeds",
+        lambda t: _wheels(np.zeros_like(t), (0.2 + 0.15 * (t // 10.0 % 3)) * _sides(t, 5.0)),
+    ),
+    (
+        "reversals",
+        "forwards and backwards in turn every second and a half, at three speeds",
+        lambda t: _wheels((0.2 + 0.2 * (t // 12.0 % 3)) * _sides(t, 3.0), 0.05 * np.ones_like(t)),
+    ),
+    (
+        "full speed",
+        "long straights at full command, short slow bends between them",
+        lambda t: _wheels(np.where(t % 10.0 < 7.0, 1.0, 0.3), 0.1 * _sides(t, 14.0) * (t % 10.0 >= 7.0)),
+    ),
+    (
+        "quick steps",
+        "commands that jump about twice a second",
+        lambda t: _wheels(0.4 + 0.3 * _sides(t, 0.7), 0.2 * _sides(t, 1.1)),
+    ),
 )
 
 

@@ -54,14 +54,11 @@ MOST_TRIALS = 20
 
 
 class MultistepFit(NamedTuple):
-    """The result of fitting parameters to windows: held-out error of the new values by the old ones', by horizon.
+    """The result of fitting parameters to windows."""
 
-    What was not fitted to windows has no interval.
-    """
-
-    horizon_s: float
-    ratios: Mapping[float, Ratio]
-    intervals: Mapping[str, tuple[float, float]]
+    horizon_s: float  # length of the windows [s]
+    ratios: Mapping[float, Ratio]  # held-out error of the new values by the old ones', by horizon [s]
+    intervals: Mapping[str, tuple[float, float]]  # of what was fitted to windows, by name in θ
 
 
 def horizons(drives: Drives) -> tuple[float, ...]:
@@ -139,10 +136,7 @@ def _problem(drives: Drives, theta: Theta, free: tuple[Coordinate, ...], windows
 
 
 def held_out_squares(drives: Drives, theta: Theta, free: Sequence[Coordinate], fitted_s: float) -> dict[float, Floats]:
-    """Predict every compared pose, by horizon [s]: its squared distance from the measured one [m²].
-
-    No pose is predicted by what was fitted to its own fold.
-    """
+    """Squared distances of compared poses from measured ones [m²], by horizon [s], as fitted to other folds alone."""
     fold = np.asarray(drives.block % min(FOLDS, int(drives.block.max()) + 1))
     windows = cut(drives, fitted_s)
     asked = {horizon: cut(drives, horizon) for horizon in horizons(drives)}
@@ -213,15 +207,12 @@ class PoseNoise(NamedTuple):
 
 
 def pose_noise(drives: Drives, theta: Theta) -> PoseNoise:
-    """The noise of measured poses, from third differences of the path of what a model leaves over.
-
-    A model's slow errors, and those of a robot that drifts, vanish in third differences or grow with the lag; the noise
-    of a pose does neither. The better the model, the fewer of its errors pass for noise.
-    """
+    """The noise of measured poses, from third differences of the path of what a model leaves over."""
     left = drives.measured - increments(drives, theta)
     heading = drives.poses[:, 0, 2]
     along = (left[:, 0] + 1j * left[:, 1]) * np.exp(1j * heading)
     steps = np.stack((along.real, along.imag, left[:, 2]), axis=1)
+    # A model's slow errors, and a robot's drift, vanish in them or grow with the lag; a pose's noise does neither.
     differences = {lag: _third_differences(drives, steps, lag) for lag in LAGS}
     enough = {lag: rows for lag, rows in differences.items() if len(rows) >= FEWEST}
     return PoseNoise(_white(enough, slice(0, 2)), _white(enough, slice(2, 3)))
@@ -258,10 +249,8 @@ def _mean_square(rows: Floats) -> float:
 
 
 def noise_floor(drives: Drives, windows: Windows, noise: PoseNoise) -> tuple[float, float]:
-    """The error that the noise of poses alone makes over windows: RMSE of position [m] and heading [rad].
-
-    Both ends of a motion are measured, each with noise in x and y; the heading at its beginning turns all of it.
-    """
+    """The error that the noise of poses alone makes over windows: RMSE of position [m] and heading [rad]."""
+    # Both ends of a motion are measured, each in x and y; the heading at its beginning turns all of it.
     chords = np.square(measured_motion(drives, windows)[:, :2]).sum(axis=1).mean()
     place = 4.0 * noise.place**2 + noise.turn**2 * chords
     return float(np.sqrt(place)), float(np.sqrt(2.0) * noise.turn)
@@ -273,10 +262,7 @@ def has_body(drives: Drives) -> bool:
 
 
 def bullet_pose_errors(drives: Drives, theta: Theta, windows: Windows) -> Floats:
-    """Measure the errors of the bullet plant's poses (M, 2): distance [m], heading [rad].
-
-    Each episode is driven in one go from its first command; windows compare the motion since their beginning.
-    """
+    """Measure errors of the bullet plant's poses (M, 2): distance [m], heading [rad]; episodes are driven in one go."""
     twists = twists_of(drives, theta)
     walked = np.zeros((len(twists), twists.shape[1] + 1, 3))
     for episode in np.unique(drives.episode):

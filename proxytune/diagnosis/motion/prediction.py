@@ -8,7 +8,6 @@ that were driven several times from the same commands: no model can predict what
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
-from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
@@ -335,13 +334,10 @@ STEP = 5e-3
 
 
 class Slopes(NamedTuple):
-    """Windows' poses (M, 3) as they are compared, in metres: forward, left, and heading times the median way.
-
-    `columns` is the change of the prediction per weight (M, 3, weights), curve by curve, free coordinates last.
-    """
+    """Windows' poses (M, 3) as they are compared, in metres: forward, left, and heading times the median way."""
 
     residuals: Floats
-    columns: Floats
+    columns: Floats  # change of the prediction per weight (M, 3, weights), curve by curve, free coordinates last
     block: Whole
 
 
@@ -375,10 +371,7 @@ def slopes_of(drives: Drives, theta: Theta, offered: Learnt, free: Sequence[inno
     twists, walked, predicted = walk(theta)
     measured = measured_motion(drives, windows)
     way = float(np.median(np.hypot(measured[:, 0], measured[:, 1])))
-    features = chain(
-        innovations.window_features(drives, named, offered, begin, length),
-        innovations.window_command_features(drives, named, offered, begin, length),
-    )
+    features = innovations.window_features(drives, named, offered, begin, length)
     changes = _pose_slopes(twists, walked, features, (window, tick - 1), 1.0 / drives.tick_hz)
     # Seen from the frame in which each window's tracked place begins.
     cosine, sine = (part[:, None] for part in cosine_and_sine(-walked[window, 0, 2]))
@@ -394,10 +387,7 @@ def slopes_of(drives: Drives, theta: Theta, offered: Learnt, free: Sequence[inno
 def _pose_slopes(
     twists: Floats, walked: Floats, features: Iterable[innovations.LearntMotion], at: tuple[Whole, Whole], tick_s: float
 ) -> Floats:
-    """Change of compared poses (M, 3, weights) per weight of the curves, to first order; places as complex numbers.
-
-    `at` is the window and tick of each pose.
-    """
+    """Change of poses `at` windows and ticks (M, 3, weights) per weight, to first order; places as complex numbers."""
     poses = innovations.integrate_twists(twists, tick_s)
     cosine, sine = cosine_and_sine(poses[:, 1:, 2] - twists[..., 2] * (tick_s / 2.0))
     axle = 0.5 * (poses[:, 1:] + poses[:, :-1])
@@ -431,23 +421,15 @@ ALIKE_AT_START = 0.1
 
 
 class Repeated(NamedTuple):
-    """The scatter of drives from the same commands: what they do not repeat, RMSE of position [m].
+    """The scatter of drives from the same commands: what they do not repeat."""
 
-    Its `share` of the model's error over the same windows is 1 where the model predicts all that repeats; `part` of all
-    windows have repeats.
-    """
-
-    share: Ratio
-    apart: float
-    part: float
+    share: Ratio  # of the model's error over the same windows: 1 where the model predicts all that repeats
+    apart: float  # RMSE of position [m]
+    part: float  # so many of all windows have repeats
 
 
 def compare_repeats(drives: Drives, theta: Theta, horizon_s: float) -> Repeated | None:
-    """Compare a model's error with what drives do not repeat; None where too little was driven twice, or was copied.
-
-    Of windows driven n times the mean is taken off, and n/(n − 1) gives back what that takes: for two drives, √(½ mean
-    square of their difference). Each drive of the log is one block: windows of repeats begin together.
-    """
+    """Compare a model's error with what drives do not repeat; None where too little was driven twice, or was copied."""
     windows = cut(drives, horizon_s)
     if len(windows.begin) < FEWEST:
         return None
@@ -464,17 +446,14 @@ def compare_repeats(drives: Drives, theta: Theta, horizon_s: float) -> Repeated 
         # Copies of drives to the last digit: they say nothing of what a robot does not repeat.
         return None
     missed = pose_errors(drives, theta, windows)[:, 0] ** 2
+    # Each drive of the log is one block: windows of repeats begin together.
     first = np.flatnonzero(np.diff(windows.window, prepend=-1))
     share = ratio(apart[kept], missed[kept], label[first][windows.window][kept])
     return Repeated(share, float(np.sqrt(apart[kept].mean())), float(kept.mean()))
 
 
 def _label_repeats(drives: Drives, windows: Windows) -> tuple[Whole, Whole]:
-    """Label each compared pose by what it repeats (M,), and count how often each of those was driven.
-
-    A pose is a repeat if its window began at the same time and all commands before it were the same, not all zero, and
-    the drive began as fast.
-    """
+    """Label compared poses (M,), alike where time, all commands and start were the same; count how often each is."""
     begin, end = drives.first[windows.begin][windows.window], drives.last[windows.increment]
     # A number for all commands up to each tick: equal ones have the same, and no commands have 0.
     rounded = np.round(drives.duties / ALIKE).astype(np.int64)

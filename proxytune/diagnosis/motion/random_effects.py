@@ -44,30 +44,23 @@ SEEN = 1.0
 
 
 class Responses(NamedTuple):
-    """Responses of the innovations to the loss of single commands, a row per command that changed anything.
+    """Responses of the innovations to the loss of single commands, a row per command that changed anything."""
 
-    `gradient` and `size` are products of the change with the innovations and with itself; `others` the gradient with
-    other innovations (columns, commands).
-    """
-
-    gradient: Floats
-    size: Floats
-    others: Floats
+    gradient: Floats  # product of the change with the innovations
+    size: Floats  # product of the change with itself
+    others: Floats  # gradient with other innovations (columns, commands)
 
 
 class RandomEffect(NamedTuple):
-    """A random effect weighed: its likeliest size, and its gain beyond what chance gives on average [nats].
-
-    The interval is all sizes that are looked for, until `infer_size_indirectly` narrows it. `left` is what the
-    likeliest lateness of every command leaves of its pull on the innovations: about 1 if lateness is all that there is.
-    """
+    """A random effect weighed."""
 
     effect: str
     parameter: str
-    value: float
-    interval: tuple[float, float]
-    gain: float
+    value: float  # its likeliest size
+    interval: tuple[float, float]  # all sizes that are looked for, until `infer_size_indirectly` narrows it
+    gain: float  # beyond what chance gives on average [nats]
     p_value: float
+    # what the likeliest lateness of every command leaves of its pull on the innovations: about 1 if lateness is all
     left: float = 0.0
 
 
@@ -143,11 +136,9 @@ def _ratios(late: Lateness, gradient: Floats, energy: Floats) -> Floats:
 
 
 def responses(fitted: Fit, others: Floats) -> Responses:
-    """Replay the drives with each command lost, and see what changes, and what would of other innovations.
-
-    Commands far apart are lost together, so that one replay tells of many.
-    """
+    """Replay the drives with each command lost, and see what changes, and what would of other innovations."""
     drives = fitted.drives
+    # Commands far apart are lost together, so that one replay tells of many.
     changed, phase = _changed_commands(drives)
     values = np.concatenate((fitted.innovations[:, None], others), axis=1)
     heard = values, values**2
@@ -160,12 +151,10 @@ def responses(fitted: Fit, others: Floats) -> Responses:
 
 
 def _changed_commands(drives: Drives) -> tuple[Whole, Whole]:
-    """Episode and tick of every command that differs from the one before it (C, 2), and its phase (C,).
-
-    Those of one phase are at least MEMORY_S apart: of commands closer together than usual the first counts.
-    """
+    """Episode and tick of commands unlike the one before (C, 2), and phases (C,); those of one are MEMORY_S apart."""
     before = np.concatenate((drives.rest[:, None], drives.duties[:, :-1]), axis=1)
     found = np.argwhere(drives.issued & np.any(np.abs(drives.duties - before) > 1e-9, axis=-1))
+    # Of commands closer together than usual the first counts.
     number = np.floor(found[:, 1] * drives.rate_hz / drives.tick_hz + 1e-6).astype(int)
     _, first = np.unique(found[:, 0] * (number.max(initial=0) + 1) + number, return_index=True)
     return found[first], number[first] % math.ceil(MEMORY_S * drives.rate_hz)

@@ -198,19 +198,15 @@ FURTHEST = 2.0
 
 
 class ScreenedCandidate(NamedTuple):
-    """A candidate with the log-likelihood gain of its score test [nats], and the same on blocks that were not fitted.
-
-    Its coordinates are at `start` after the step, which set out for the probe. Chance gains as much with any form of
-    any effect as often as `p_value`; `column` is the direction in the innovations that it explains (3N,).
-    """
+    """A candidate with its score test."""
 
     candidate: Candidate
-    start: tuple[float, ...]
-    probe: tuple[float, ...]
-    gain: float
-    held_out: float
-    p_value: float
-    column: Floats
+    start: tuple[float, ...]  # its coordinates after the step
+    probe: tuple[float, ...]  # what the step set out for
+    gain: float  # in log-likelihood [nats]
+    held_out: float  # the same on blocks that were not fitted
+    p_value: float  # how often chance gains as much with any form of any effect
+    column: Floats  # direction in the innovations that it explains (3N,)
 
 
 _Probe = tuple[Candidate, tuple[float, ...], tuple[float, ...], Floats]

@@ -61,14 +61,11 @@ def widen(model: Fit) -> Fit:
 
 
 def select_effects(base: Fit, seed: int, report: Progress) -> Findings:
-    """Search for what a model is missing, and drop what is negligible.
-
-    What was chosen beside an effect that does harm may be wrong. So the search is then made once more without that
-    effect, and taken where it predicts no worse.
-    """
+    """Search for what a model is missing, and drop what is negligible."""
     first, misled = _search_and_drop(base, seed, report, ())
     if not misled:
         return first
+    # What was chosen beside an effect that does harm may be wrong: without it, where that predicts no worse.
     names = tuple(dropped.effect.effect for dropped in misled)
     report(f"searching again without {', '.join(names)}")
     again, _ = _search_and_drop(base, seed, report, names)
@@ -297,11 +294,9 @@ def _fitted(model: Fit, effect: FittedCandidate | RandomEffect) -> FittedCandida
 
 
 def fit_random(model: Fit, effect: RandomEffect) -> FittedCandidate:
-    """Fit the model with an effect that draws.
-
-    The delay gives up the mean lateness of the draws, which it had to stand for without the effect.
-    """
+    """Fit the model with an effect that draws."""
     theta = {**model.theta, effect.parameter: effect.value}
+    # The delay gives up the mean lateness of the draws, which it had to stand for without the effect.
     late = lateness(theta, model.drives.rate_hz) - lateness(model.theta, model.drives.rate_hz)
     theta["delay"] = max(0.0, model.theta["delay"] - late)
     return FittedCandidate(effect.gain, fit(model.drives, theta, model.free, model.noise), random=effect)
@@ -342,21 +337,16 @@ def _rivals(best: FittedCandidate, chosen: ScreenedCandidate, evidence: Evidence
             other.gain > best.gain - rules.rival_nats
             or (other.gain >= rules.rival_share * best.gain and predicts_no_worse(other.fitted, best.fitted))
         )
-        if one.candidate.effect != chosen.candidate.effect and (close or _cosine(one, chosen) > rules.rival_cosine):
+        size = float(np.linalg.norm(one.column) * np.linalg.norm(chosen.column))
+        alike = size > 0.0 and float(one.column @ chosen.column) / size > rules.rival_cosine
+        if one.candidate.effect != chosen.candidate.effect and (close or alike):
             rivals.setdefault(one.candidate.effect, one.candidate)
     return tuple(rivals.values())
 
 
-def _cosine(one: ScreenedCandidate, other: ScreenedCandidate) -> float:
-    size = float(np.linalg.norm(one.column) * np.linalg.norm(other.column))
-    return float(one.column @ other.column) / size if size > 0.0 else 0.0
-
-
 def drop_idle(model: Fit, adopted: Sequence[AdoptedEffect]) -> tuple[Fit, list[AdoptedEffect]]:
-    """Drop the first effect that no longer pays beside the one adopted last; at most one a round.
-
-    Random effects stay: they move no mean, so the likelihood of the mean cannot speak for them.
-    """
+    """Drop the first effect that no longer pays beside the one adopted last; at most one a round."""
+    # Random effects stay: they move no mean, so the likelihood of the mean cannot speak for them.
     for effect in adopted[:-1]:
         if effect.free and len(adopted) > 1:
             rest = without_effect(Variant(model.theta, model.free), effect, model.drives.rate_hz)

@@ -270,13 +270,11 @@ class SignalCurve(NamedTuple):
 
 
 def fit_curves(fitted: Fit) -> list[SignalCurve]:
-    """Fit every signal group to what the model leaves over, best first.
-
-    The best few are fitted again with the noise that they leave: a candidate's noise is fitted too.
-    """
+    """Fit every signal group to what the model leaves over, best first."""
     plain = float(held_out_log_likelihood(fitted).sum())
     found = [_fit_curve(fitted, group, _columns(fitted, added), plain) for group, added in signal_groups(fitted)]
     found.sort(key=lambda curve: -curve.gain)
+    # The best are fitted again with the noise that they leave: a candidate's noise is fitted too.
     promising = [curve for curve in found[:REFITTED] if curve.gain > 0.0]
     again = [_fit_with_own_noise(fitted, curve, plain) for curve in promising]
     return sorted(again + found[len(promising) :], key=lambda curve: -curve.gain)

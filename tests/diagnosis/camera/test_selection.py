@@ -240,8 +240,6 @@ def test_a_planted_effect_is_named(effect):
 def test_a_pair_an_effect_on_another_map_one_that_needs_motion_and_one_without_a_stated_scatter_are_named():
     named = select_camera_effects(everything({"camera_roll": -4.0, "lens_distortion": -0.25}), DECLARED)
     assert set(named.effects) == {"camera_roll", "lens_distortion"}
-    assert [len(one.effects) for one in named.losses] == [0, 1, 2]
-    assert named.losses[0].loss > named.losses[1].loss > named.losses[2].loss
     full = fit_everything(on("horseshoe", {"camera_roll": 4.0}), OPTICS.mounting, {}, learn_scatter=False)
     assert select_camera_effects(full, DECLARED).effects == ("camera_roll",)
     named = select_camera_effects(everything({"camera_latency": 0.12}, count=40, moving=True), DECLARED)

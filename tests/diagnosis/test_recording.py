@@ -26,10 +26,6 @@ def exact(monkeypatch):
     monkeypatch.setattr(filming, "tracked", lambda poses, random: poses)
 
 
-def pose_at(episode, time):
-    return np.array([np.interp(time, episode.times, column) for column in episode.poses.T])
-
-
 @pytest.mark.parametrize("frames", [7, pytest.param(47, marks=pytest.mark.slow)])
 def test_there_are_as_many_pictures_as_asked_for_each_at_an_instant_of_its_own(family, monkeypatch, frames):
     monkeypatch.setattr(filming, "SHORTEST_S", 0.5)
@@ -59,7 +55,8 @@ def test_every_start_is_driven_from_in_both_lanes(family, exact, monkeypatch, na
 @pytest.mark.slow
 def test_most_pictures_are_taken_in_the_lane_on_straights_and_in_bends(family, exact):
     drives = list(film(family, 60, 1))
-    poses = np.array([pose_at(drive.episode, time) for drive in drives for time in drive.times])
+    each = ([np.interp(one.times, one.episode.times, column) for column in one.episode.poses.T] for one in drives)
+    poses = np.concatenate([np.transpose(columns) for columns in each])
     assert 0.2 < (np.floor(poses[:, :2] / (ROAD.size[0] / 3)) != 1).all(axis=1).mean() < 0.8
     assert (np.abs(lane_pose(ROAD, poses[:, :2], poses[:, 2]).deviation) < ROAD.lane_width / 2).mean() > 0.75
 

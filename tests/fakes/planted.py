@@ -11,7 +11,7 @@ from manoeuvres import RATE_HZ, make_drives
 from numpy.typing import NDArray
 
 from proxytune.diagnosis import Drives, Fit
-from proxytune.diagnosis.motion import curve_offer, screening
+from proxytune.diagnosis.motion import curve_offer, discrepancy, screening
 from proxytune.diagnosis.motion.clocks import cut_into_blocks
 from proxytune.diagnosis.motion.drives import gather
 from proxytune.diagnosis.motion.fitting import fit
@@ -40,6 +40,7 @@ def look_for_few(patch: pytest.MonkeyPatch, *more: str) -> None:
     """Let diagnoses try FEW of the shipped effects and these, on one plant, and few curves: answers' use is tested."""
     for name, fewer in {"DUTY_KNOTS": 10, "RAMPS_S": (0.0, 0.4), "MOST_CORNERS": 20, "GRID": (1, 2)}.items():
         patch.setattr(curve_offer, name, fewer)
+    patch.setattr(discrepancy, "ROUNDS", 2)
     patch.setattr("proxytune.diagnosis.motion.diagnose.has_body", lambda _: False)
     tried, left_out = screening.motion_effects, set(screening.MOTION_EFFECTS) - {*FEW, *more}
     patch.setattr(screening, "motion_effects", lambda every: tuple(one for one in tried(every) if one not in left_out))

@@ -252,14 +252,11 @@ def test_an_expert_that_cannot_drive_ends_it_with_where_and_how_badly(blocked):
         collect_samples(Schoolroom(Wobbly(), blocked=blocked), WIDE, count=1000, seed=1, lesson_s=1.0)
 
 
-def still(observation):
-    return np.zeros(1)
-
-
 def test_a_guided_lesson_shows_what_the_policy_visits_with_the_experts_commands():
     room = Tightrope(Wobbly())
     how = {"count": 30, "seed": 1, "lesson_s": 2.0}
-    shown, guided = (collect_samples(room, Distribution({}), policy=policy, **how) for policy in (None, still))
+    policies = (None, lambda observation: np.zeros(1))
+    shown, guided = (collect_samples(room, Distribution({}), policy=policy, **how) for policy in policies)
     assert len(guided.commands) == 30
     assert np.array_equal(guided.commands, -1.2 * guided.observations)
     assert np.abs(guided.observations).max() > 2.0 * np.abs(shown.observations).max()

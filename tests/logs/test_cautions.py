@@ -34,11 +34,6 @@ def commanded(factor):
     return changed(lambda episode: replace(episode, commands=factor * episode.commands))
 
 
-def thrice():
-    one = LOG.episodes[0]
-    return replace(LOG, episodes=(one, replace(one, name="again"), replace(one, name="third")))
-
-
 def named(*names):
     pairs = zip(LOG.episodes, names, strict=False)
     return replace(LOG, episodes=tuple(replace(episode, name=name) for episode, name in pairs))
@@ -61,6 +56,7 @@ def in_degrees():
     return replace(LOG, command="twist", episodes=tuple(replace(one, commands=own) for one, own in pairs))
 
 
+THRICE = replace(LOG, episodes=tuple(replace(LOG.episodes[0], name=name) for name in ("00", "again", "third")))
 CASES = {
     "headings along y": (
         changed(lambda episode: replace(episode, poses=episode.poses + (0.0, 0.0, np.pi / 2))),
@@ -79,7 +75,7 @@ CASES = {
     "a left-handed frame": (moved(1, -1, -1), "turns the other way than its commands say"),
     "duties at half scale": (commanded(0.5), r"drives (1.9|2|2.1) times as fast as its largest commands say: ch"),
     "a wheel in mm": (replace(LOG, geometry={"wheel_radius": 31.8}), "its wheel_radius is 31.8 m, and robots have"),
-    "drives given three times": (thrice(), r"drive 'again' is a copy of '00' to the last digit \(and 1 more"),
+    "drives given three times": (THRICE, r"drive 'again' is a copy of '00' to the last digit \(and 1 more"),
     "an é in two forms": (named("\u00e9", "e\u0301"), "read the same and are taken for different ones"),
 }
 

@@ -29,13 +29,10 @@ def schemes():
     return {name: {**roots[0], **over} for name, over in zip(("light", "dark", "print"), roots, strict=True)}
 
 
-def luminance(colour):
-    parts = np.array(colour)
-    return np.where(parts <= 0.04045, parts / 12.92, ((parts + 0.055) / 1.055) ** 2.4) @ [0.2126, 0.7152, 0.0722]
-
-
 def contrast(one, other):
-    low, high = sorted(luminance(to_rgb(colour)) for colour in (one, other))
+    parts = np.array([to_rgb(one), to_rgb(other)])
+    linear = np.where(parts <= 0.04045, parts / 12.92, ((parts + 0.055) / 1.055) ** 2.4)
+    low, high = sorted(linear @ [0.2126, 0.7152, 0.0722])  # luminances
     return (high + 0.05) / (low + 0.05)
 
 

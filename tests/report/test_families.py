@@ -65,16 +65,13 @@ def test_who_teaches_best_is_said_with_the_samples_saved(lessons, says):
     assert says in families_answer(compared(*BOTH, lessons=lessons))
 
 
-def labels(figure):
-    return {text for axes in figure.axes for text in axes.get_legend_handles_labels()[1]}
-
-
 def test_a_panel_per_use_tells_best_alike_and_worse_apart_draws_open_intervals_and_has_no_teaching_without_it():
     families = (family("good", 0, DEAR), family("bad", 4, DEAR), family("poor", 3, CHEAP))
     lessons = {"good": lesson(-20.0), "bad": Lesson({}, failure="no"), "poor": lesson(-30.0, (10.0, -50.0, 30.0))}
     figure = families_figure(compared(*families, lessons=lessons))
     assert [axes.get_xlabel().split("\n")[0] for axes in figure.axes] == ["fresh PRPV", "PLV", "time per"]
-    assert labels(figure) == {"best", "cannot be told from it", "worse"}
+    labels = {text for axes in figure.axes for text in axes.get_legend_handles_labels()[1]}
+    assert labels == {"best", "cannot be told from it", "worse"}
     assert [text.get_text() for text in figure.axes[1].texts] == ["not known"]
     assert [text.get_text() for text in figure.axes[0].get_yticklabels()] == ["good", "bad", "poor"]
     assert figure.axes[1].get_xlim()[0] < -40.0

@@ -23,11 +23,6 @@ TOLD_BY_STARTS = Information("blur", (("daredevil", 0.6), ("wary", 0.4)), (("dis
 CHANCE, EXPLAINING = (Chance(65.8, 13.7, p_value, 1000) for p_value in (0.001, 0.3))
 
 
-def box_of(known):
-    """The box of which an interval fills this share."""
-    return Interval(known.name, 0.0, (known.interval[1] - known.interval[0]) / known.share)
-
-
 def study(parameters=(TRIM, PITCH, BLUR), *, names=("trim", "delay"), family=DEFAULT_FAMILY, fresh=True, **changes):
     """As much of a study as a sentence tells, with changes of it, of its settings or of what is known."""
     settings = {"budget": 24, "starts": 4, "confirm": 1, "learn_from": ()}
@@ -40,7 +35,8 @@ def study(parameters=(TRIM, PITCH, BLUR), *, names=("trim", "delay"), family=DEF
     prpv, nominal, chance, most_starts = (facts.pop(key) for key in ("prpv", "nominal", "chance", "most_starts"))
     judged = Namespace(chance=chance, prpv=Namespace(value=prpv.value))
     expected = Namespace(prpv=Namespace(value=prpv)) if fresh else None
-    space = Namespace(intervals=tuple(map(box_of, parameters)), names=names)
+    boxes = tuple(Interval(one.name, 0.0, (one.interval[1] - one.interval[0]) / one.share) for one in parameters)
+    space = Namespace(intervals=boxes, names=names)
     return Namespace(
         **facts,
         expected=expected,

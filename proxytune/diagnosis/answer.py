@@ -1,6 +1,6 @@
-"""The answer that both houses of a diagnosis give, motion and camera: estimates, verdicts, and the rules they go by.
+"""The answer that both parts of a diagnosis give, motion and camera: estimates, verdicts, and the rules they go by.
 
-Each house fits the declared model, selects the effects that it lacks, drops those that are negligible, and compares
+Each part fits the declared model, selects the effects that it lacks, drops those that are negligible, and compares
 the error before and after on data that was not fitted. Both then say one of five words (`verdict`). Every threshold
 that decides what is named, believed or told of motion is one of `Rules`: a diagnosis takes them as an argument, and its
 drives carry them (`Drives.rules`), so that one may ask what another rule would have said.

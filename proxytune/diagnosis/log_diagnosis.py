@@ -1,7 +1,7 @@
 """The diagnosis of a whole log: of motion where it has commands, of the camera where it has frames.
 
-`diagnose_log` asks the two houses, which know nothing of one another, and joins their answers; a house that refuses is
-told with its reason. `predict_pictures` draws what a fitted model's camera would have seen on a log's drives.
+`diagnose_log` asks the two parts, which know nothing of one another, and joins their answers; where one refuses, its
+reason is told. `predict_pictures` draws what a fitted model's camera would have seen on a log's drives.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -27,7 +27,7 @@ from proxytune.logs import Frames, Log, log_cautions, read_pictures
 from proxytune.settings import nearest
 from proxytune.space import Theta
 
-House = TypeVar("House")
+Part = TypeVar("Part")
 
 
 @dataclass(frozen=True)
@@ -97,9 +97,9 @@ def diagnose_log(
     return LogDiagnosis(log.name, robot, moved, pictured, no_motion, no_camera, cautions)
 
 
-def _or_refusal(house: Callable[[], House]) -> tuple[House | None, str]:
+def _or_refusal(ask: Callable[[], Part]) -> tuple[Part | None, str]:
     try:
-        return house(), ""
+        return ask(), ""
     except (LogError, SettingsError) as problem:
         return None, str(problem)
 

@@ -1,6 +1,6 @@
 """The diagnosis of a robot's camera: tuned, tested, its missing effects named, and the error before and after.
 
-`diagnose_camera` goes through the whole house: frames to edges, a fit with every effect, the fewest effects that do as
+`diagnose_camera` goes through all of it: frames to edges, a fit with every effect, the fewest effects that do as
 well, their size on frames kept aside, and how the pictures look. `conclude` gives the verdict, and `describe_map`
 how the map was laid, as the fit has it.
 """

@@ -2,7 +2,7 @@
 
 Displacement of markings [pixel] of every edge point, by cameras fitted without its frame, and brightness of the floor
 [grey levels], with intervals from a bootstrap over frames. An effect's size is the error without it over the error with
-it; `weigh_effects` drops effects whose size is below MATERIAL. `CameraDiagnosis` is what the house answers.
+it; `weigh_effects` drops effects whose size is below MATERIAL. `CameraDiagnosis` is the answer.
 """
 
 from collections.abc import Mapping, Sequence

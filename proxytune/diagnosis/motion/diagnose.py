@@ -1,6 +1,6 @@
 """The diagnosis of a robot's motion: what its declared model leaves over, the effects that explain it, and their use.
 
-`diagnose` goes through the whole house: clocks, fit, forward selection, multistep fit, model discrepancy, and errors on
+`diagnose` goes through all of it: clocks, fit, forward selection, multistep fit, model discrepancy, and errors on
 drives kept aside. Its verdict compares the error of open-loop prediction that is left with the bracket of what a right
 model could have: from what the noise of measured poses alone makes, to the lowest error that any model reached.
 """

@@ -100,12 +100,12 @@ class FittedCandidate(NamedTuple):
 
 
 class Evidence(NamedTuple):
-    """What speaks for a missing effect in what a model leaves over; `fits` are the best screened by label."""
+    """What speaks for a missing effect in what a model leaves over."""
 
-    screened: list[ScreenedCandidate]
-    fits: dict[str, FittedCandidate]
-    random: tuple[RandomEffect, ...]
-    curves: list[SignalCurve]
+    screened: list[ScreenedCandidate]  # every form of every effect, by its score test
+    fits: dict[str, FittedCandidate]  # the best of these, fitted in full, by the label of their form
+    random: tuple[RandomEffect, ...]  # effects that draw: lost and late commands
+    curves: list[SignalCurve]  # of motion over every signal, whatever its name
 
 
 def gather_evidence(model: Fit, taken: set[str], seed: int) -> Evidence:

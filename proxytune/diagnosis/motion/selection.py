@@ -6,11 +6,12 @@ From the model with declared parameters, fitted, each round of `search` goes thr
     refit        the best few, together with the free parameters and the noise              evidence.gather_evidence
     weigh        the held-out gain G of each, and of curves over every signal [nats]        evidence.gather_evidence
     adopt        the best of p ≤ p_value and G ≥ least_gain_nats that predicts no worse     choose_best, adopt
-    widen        the range of a value at its end, which other robots than most may need     widen
     drop         backwards: what pays no more beside the effect adopted last                drop_idle
+    widen        the range of a value at its end, which other robots than most may need     widen
 
 and looks again at what the new model leaves over, until nothing pays or a curve says far more than any name. Effects
-of a car hide one another, and some pay together but not one at a time: where a curve is left over, all that cars are
+of a car hide one another, so that chance is asked once all are there (`drop_unconfirmed`), and some pay together but
+not one at a time: where a curve is left over, all that cars are
 modelled with is fitted together, and what is not sure is taken out (`eliminate`, backward elimination). Evidence
 grows with the length of a log, usefulness does not: `select_effects` then drops the effects that are negligible for
 prediction (`effect_size`), and searches once more without one that did harm while others were chosen beside it.
@@ -236,7 +237,10 @@ def _least_gain(adopted: Sequence[AdoptedEffect], rules: Rules) -> float:
 
 
 def choose_best(model: Fit, evidence: Evidence, least: float, p_value: float | None = None) -> FittedCandidate | None:
-    """Choose the effect with most evidence, if that is more than chance and predicts no worse."""
+    """Choose the effect with most evidence, of those with at least so much [nats] that predict no worse; None if none.
+
+    Chance does as well as the chosen with a probability of at most `p_value`, or what the rules say.
+    """
     rules = model.drives.rules
     most = rules.p_value if p_value is None else p_value
     fits = [one for one in evidence.fits.values() if one.screened and one.screened.p_value <= most]

@@ -116,7 +116,8 @@ def test_what_does_not_act_on_motion_cannot_be_declared(name, nearest):
 
 
 @pytest.mark.slow
-def test_the_same_seed_gives_the_same_diagnosis(diagnosis):
+def test_the_same_seed_gives_the_same_diagnosis(diagnosis, monkeypatch):
+    look_for_few(monkeypatch)
     again = diagnose(scrubbing_log(), ROBOT, ("trim", "delay"))
     assert again.theta == diagnosis.theta
     assert again.found.tried == diagnosis.found.tried

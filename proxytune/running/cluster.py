@@ -307,7 +307,7 @@ class Cluster:
                 self._woken.clear()
                 for key, one in list(held.items()):
                     over = one.result.done()
-                    came = self._ended(key, one) if over else self._under_way(key, one, pieces, timeout_s)
+                    came = self._ended(key, one) if over else self._under_way(key, held, pieces, timeout_s)
                     if came is _UNDER_WAY:
                         continue
                     # A worker that was left behind is not free before it has ended what it has.
@@ -322,9 +322,9 @@ class Cluster:
             with suppress(Exception):
                 self._client.cancel([one.future for one in held.values()], force=True)
 
-    def _under_way(self, key: Key, one: _Held, pieces: _Pieces, timeout_s: float | None) -> Any:
+    def _under_way(self, key: Key, held: Mapping[Key, _Held], pieces: _Pieces, timeout_s: float | None) -> Any:
         """What becomes of a piece that a worker has not ended, if it still is one."""
-        worker = self._workers.get(key)
+        worker, one = self._workers.get(key), held[key]
         if worker is None or one.future.client is not self._client:
             died = worker is None and not one.left_behind and pieces.has_died(one.number)
             return LOST if died else _AGAIN
@@ -337,6 +337,10 @@ class Cluster:
         if self._silent(worker):
             one.left_behind = True
             pieces.come_back(one.number)
+            # Dask fetches together what ends together: what waits for this one's result is fetched anew.
+            for other in held.values():
+                if not (other.left_behind or other.result.done()) and other.future.client is self._client:
+                    other.result = self._fetched(other.future)
         return _UNDER_WAY
 
     def _ended(self, key: Key, one: _Held) -> Any:

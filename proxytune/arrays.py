@@ -1,4 +1,4 @@
-"""Types of arrays, by what they hold, and how they are gone through: by NumPy's buffers, by compiled loops, threads."""
+"""Types of arrays, by what they hold, and how they are gone through: NumPy's buffers, compiled loops, one thread."""
 
 import functools
 import sys

@@ -2,7 +2,6 @@
 
 import argparse
 from collections.abc import Mapping
-from typing import Any
 
 from proxytune.cli.terminal import Answer
 from proxytune.storage import Store, locked, salvage
@@ -21,13 +20,17 @@ def run(arguments: argparse.Namespace) -> Answer:
         found = salvage(settings.home)
         with Store.read(settings.home) as store:
             trials = len(store.trials(search))
-    document: dict[str, Any] = {"damaged": False, "aside": None, "kept": None, "lost": None, "trials": trials}
-    # Until format 7 "unchecked" said why scores had not been compared with their episodes
-    document |= {"problems": [], "unchecked": ""}
+    document = {
+        "damaged": found is not None,
+        "aside": str(found.aside) if found else None,
+        "kept": dict(found.kept) if found else None,
+        "lost": dict(found.lost) if found else None,
+        "trials": trials,
+        "problems": [found.problem] if found else [],
+        "unchecked": "",  # until format 7, why scores had not been compared with their episodes
+    }
     if found is None:
         return Answer(document, "study.db is whole; nothing was changed")
-    document |= {"damaged": True, "aside": str(found.aside), "problems": [found.problem]}
-    document |= {"kept": dict(found.kept), "lost": dict(found.lost)}
     lost = {table: count for table, count in found.lost.items() if count}
     proposes = f"proposes the trials from {trials + 1} on again, the same ones by the same version of proxytune, and "
     lines = [

@@ -101,7 +101,8 @@ def _chords(episode: LogEpisode) -> Chords:
 
 def _axes(drives: list[Chords]) -> Iterator[str]:
     """Tell where the robot moves in a mirror: x or y reversed, or exchanged, and headings not."""
-    _, course, heading, speed, _ = (np.concatenate(parts) for parts in zip(*drives, strict=True))
+    names = ("speed", "course", "heading")
+    speed, course, heading = (np.concatenate([getattr(one, name) for one in drives]) for name in names)
     if len(speed) < ENOUGH:
         return
     moves = speed >= max(MOVES * float(np.quantile(speed, 0.9)), 1e-9)

@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -87,29 +86,35 @@ def record_episode(family: DomainFamily, episode: Episode, *, filmed: bool = Fal
     Raises:
         EpisodeError: If the agent or the domain fails, or columns of its recording do not belong together.
     """
-    kept, pictures = Recording({}, {}, {}), None
-    own: Any = family
-
-    def run(episode: Episode) -> Mapping[str, float]:
-        nonlocal kept, pictures
-        if not can_record(family):
-            return family.run(episode)
-        kept = own.record(episode)
-        _check_columns("poses", kept.poses)
-        _check_columns("commands", kept.commands)
-        if filmed and hasattr(family, "replay"):
-            issued = np.column_stack([column for name, column in kept.commands.items() if name != "time"])
-            seen = np.asarray(own.replay(episode, issued).pictures)
-            coloured = seen.dtype == np.uint8 and seen.ndim == 4 and seen.shape[-1] == 3
-            pictures = seen if coloured and len(seen) == len(issued) else None
-        return kept.metrics  # type: ignore[no-any-return]
-
-    # What running an episode asks of a family
-    recorder: Any = SimpleNamespace(metrics=family.metrics, run=run)
+    recorder: Any = _Recorder(family, filmed)
     outcome = run_episode(recorder, episode)
     if outcome.metrics is None:
         raise EpisodeError(failure_of(outcome))
-    return RecordedEpisode(outcome.metrics, kept.poses, kept.commands, pictures)
+    return RecordedEpisode(outcome.metrics, recorder.kept.poses, recorder.kept.commands, recorder.pictures)
+
+
+class _Recorder:
+    """What running an episode asks of a family, answered by one that records it if it can."""
+
+    def __init__(self, family: Any, filmed: bool) -> None:
+        self._family, self._filmed = family, filmed
+        self.metrics: Mapping[str, str] = family.metrics
+        self.kept = Recording({}, {}, {})
+        self.pictures: NDArray[np.uint8] | None = None
+
+    def run(self, episode: Episode) -> Mapping[str, float]:
+        """Run the episode, and keep its recording and pictures."""
+        if not can_record(self._family):
+            return self._family.run(episode)  # type: ignore[no-any-return]
+        self.kept = self._family.record(episode)
+        _check_columns("poses", self.kept.poses)
+        _check_columns("commands", self.kept.commands)
+        if self._filmed and hasattr(self._family, "replay"):
+            issued = np.column_stack([column for name, column in self.kept.commands.items() if name != "time"])
+            pictures = np.asarray(self._family.replay(episode, issued).pictures)
+            coloured = pictures.dtype == np.uint8 and pictures.ndim == 4 and pictures.shape[-1] == 3
+            self.pictures = pictures if coloured and len(pictures) == len(issued) else None
+        return self.kept.metrics
 
 
 def _check_columns(what: str, columns: Columns) -> None:

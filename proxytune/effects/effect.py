@@ -117,6 +117,7 @@ class Trace:
     draws: Draws | None = None  # what it draws, if it strikes at random
     # whether it acts in a part of the map: its parameters after the first are x, y [m] and a radius [m]
     placed: bool = False
+    contains: tuple[str, ...] = ()  # other effects that are special cases of it
 
     def shown_in(self, form: str) -> WheelCurve | Means:
         """Curve or means that show the form of this name."""

@@ -13,6 +13,7 @@ from proxytune.effects.effect import (
     Cue,
     DeadReckoning,
     FilterContext,
+    Form,
     LowPassState,
     Means,
     Panel,
@@ -139,6 +140,67 @@ class YawLag(ShippedEffect):
         """The mean yaw rate over each sample."""
         late, after = low_pass(signal[..., 2:], memory)
         return np.concatenate((signal[..., :2], late), axis=-1), after
+
+
+LEAST_DAMPING = 0.05
+"""So much of the resistance to turning at rest is always left."""
+
+
+class BodyState(NamedTuple):
+    """The forward speed under way, the yaw rate (…,) at the end of the last sample, and samples per second."""
+
+    forward: LowPassState
+    yaw: Signal
+    rate_hz: float
+
+
+@effect("inertia", Stage.MOTION)
+class Inertia(ShippedEffect):
+    """The body follows its wheels with lags; the floor resists turning, the more the faster the robot drives.
+
+    dv/dt = (asked − v) / forward, d yaw/dt = (asked − damping · yaw) / turn, damping = 1 + linear · v + square · v².
+    Source: the dynamic model of a Duckiebot by Ercan and others, with 1 / u1, 1 / w1 and w3 / w1 for the first three.
+    """
+
+    forward: float = parameter("s", 0.0, 10.0, probes=(0.1, 0.1, 0.2, 0.2, 0.1, 0.4), usual=(0.0, 1.0),
+        source="a body on tyres that give: some hundredths to tenths of a second")  # fmt: skip
+    turn: float = parameter("s", 0.0, 10.0, probes=(0.1, 0.1, 0.3, 0.3, 0.1, 0.3), usual=(0.0, 1.0),
+        source="a body that has to be turned on tyres that give: some hundredths to tenths of a second")  # fmt: skip
+    linear: float = parameter("s/m", -50.0, 50.0, probes=(0.3, 1.0, 0.3, 1.0, -0.3, -0.3), usual=(-5.0, 5.0),
+        source="tyres that slip sideways: some tenths at 1 m/s; backwards the other way")  # fmt: skip
+    square: float = parameter("s²/m²", -200.0, 200.0, probes=(0.5, 2.0, 0.5, 2.0, -0.5, -0.5), usual=(-20.0, 20.0),
+        source="understeer of cars is some thousandths, that of a small robot with soft tyres some units")  # fmt: skip
+    trace = Trace(
+        (*TURNING, Cue.TRANSIENTS),
+        _by_turn_rate(Panel("forward", "forward speed [m/s]", "turn", share=True)),
+        forms=tuple(Form((("forward",), ("turn",), (by,)), f"turning is resisted by {name}") for by, name in
+                    (("linear", "speed"), ("square", "the square of speed"))),
+        contains=("motor_lag", "yaw_lag", "understeer"),
+    )  # fmt: skip
+
+    def begin(self, context: FilterContext) -> BodyState:
+        """The resting motion has been reached."""
+        rest = np.asarray(context.rest, dtype=float)
+        forward = low_pass_at(rest[..., :1], self.forward * context.rate_hz)
+        return BodyState(forward, rest[..., 2] / self._damping(rest[..., 0]), context.rate_hz)
+
+    def apply(self, signal: Signal, memory: BodyState) -> tuple[Signal, BodyState]:
+        """The mean motion over each sample; turning is resisted by the mean forward speed of that sample."""
+        (pushed, after), yaw = low_pass(signal[..., :1], memory.forward), memory.yaw
+        damping = self._damping(pushed[..., 0])
+        steady = signal[..., 2] / damping
+        if self.turn:
+            samples = self.turn * memory.rate_hz / damping
+            kept = np.exp(-1.0 / samples)
+            starts, gained = np.empty(kept.shape), (1.0 - kept) * steady
+            for number in range(kept.shape[-1]):
+                starts[..., number] = yaw
+                yaw = kept[..., number] * yaw + gained[..., number]
+            steady = steady + samples * (1.0 - kept) * (starts - steady)
+        return np.stack((pushed[..., 0], signal[..., 1], steady), axis=-1), memory._replace(forward=after, yaw=yaw)
+
+    def _damping(self, forward: Signal) -> Signal:
+        return np.maximum(LEAST_DAMPING, 1.0 + self.linear * forward + self.square * forward**2)
 
 
 REST_SPEED = 0.02

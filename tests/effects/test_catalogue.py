@@ -25,8 +25,8 @@ ORDER = (
     "slew_rate", "driver_map", "dead_band", "stiction", "saturation", "trim", "wheel_gain", "battery_sag",
     "thermal_fade", "motor_lag", "backlash", "wheel_ripple",
     # motion: from wheels to the body, then the floor
-    "yaw_scrub", "understeer", "yaw_lag", "turn_slip", "lateral_slip", "cross_coupling", "floor_slope",
-    "slippery_patch",
+    "yaw_scrub", "understeer", "yaw_lag", "inertia", "turn_slip", "lateral_slip", "cross_coupling",
+    "floor_slope", "slippery_patch",
     # measurement, camera, image
     "marker_offset", "heading_offset",
     "camera_pitch", "camera_roll", "camera_yaw", "camera_height", "camera_forward",

@@ -193,15 +193,24 @@ def _linearise(
 def _fit_curves(task: _Task, patient: bool) -> tuple[Theta, Mapping[str, float], Sequence[Theta]]:
     """Fit the curves to all parts, with what each group gained, and without each fold in turn; by names in θ.
 
-    The moving coordinates of the model are fitted along. A patient fit looks for what matters in few parts. There are
-    no folds where errors do not come near what would do.
+    The moving coordinates of the model are fitted along. The chosen groups alone are linearised until they settle,
+    then all again, until the same are chosen. A patient fit looks for what matters in few parts. There are no
+    folds where errors do not come near what would do.
     """
     drives, offer, moving, rules = task.drives, task.offer, task.moving, task.drives.rules
-    names = _column_groups(offer, moving)
-    groups = {name: slice(names.index(name), names.index(name) + names.count(name)) for name in dict.fromkeys(names)}
-    own, (low, high) = groups.get(MODEL, slice(0)), spans(moving, drives)
+    names = np.array(_column_groups(offer, moving))
+    own, (low, high) = names == MODEL, spans(moving, drives)
     given, errors = task.given, task.errors
     now, left, apart = dict[str, float](), list[float](), list[float]()
+    kept, active, since = np.full(len(names), True), set[str](), 0
+
+    def choose(sums: Sums) -> ChosenGroups:
+        """Choose among the groups whose columns are kept."""
+        here = names[kept].tolist()
+        groups = {name: slice(here.index(name), here.index(name) + here.count(name)) for name in dict.fromkeys(here)}
+        found, weights = choose_groups(sums, groups, rules, rare=patient), np.zeros(len(names))
+        weights[kept] = found.weights
+        return found._replace(weights=weights)
 
     def stepped(chosen: ChosenGroups) -> dict[str, float]:
         """The chosen curves, and the moving coordinates a step further."""
@@ -212,7 +221,7 @@ def _fit_curves(task: _Task, patient: bool) -> tuple[Theta, Mapping[str, float],
         return {**theta_at({}, moving, np.clip(here + step, low, high)), **_theta(offer, chosen)}
 
     while True:
-        chosen = choose_groups(given, groups, rules, rare=patient)
+        chosen = choose(given)
         if not chosen.gains:
             return {}, {}, ()
         left.append(float(np.linalg.norm(errors, axis=1).mean()))
@@ -220,14 +229,21 @@ def _fit_curves(task: _Task, patient: bool) -> tuple[Theta, Mapping[str, float],
         # At the pace of the last step another would not do.
         if len(left) > 2 and apart[-1] - task.aim > apart[-2] - apart[-1]:
             return {}, chosen.gains, ()
-        if len(left) == ROUNDS or min(left[-2:]) > SETTLED * min(left[:-2], default=np.inf):
-            break
+        if kept.all():
+            if len(left) >= ROUNDS or (len(left) > 2 and set(chosen.gains) == active):
+                break
+            active, since = set(chosen.gains), len(left) - 1
+        # All are offered again after the first step, which is the longest, where the chosen ones settled, and at last.
+        settled = len(left) in (1, ROUNDS - 1) or min(left[-2:]) > SETTLED * min(left[since:-2], default=np.inf)
+        kept = settled | np.isin(names, [*active, LEVEL, MODEL])
         now = stepped(chosen)
         chosen.weights[own] = 0.0
-        given, errors = _linearise(drives, {**task.theta, **now}, offer, moving, chosen.weights)
+        some = tuple(curve for curve in offer.curves if settled or curve.group in {*active, LEVEL})
+        to = replace(offer, curves=some)
+        given, errors = _linearise(drives, {**task.theta, **now}, to, moving, chosen.weights[kept])
     fold = np.arange(_parts(drives)) % FOLDS
     without = [given.only(np.flatnonzero(fold != one)) for one in range(FOLDS)]
-    folds = [stepped(choose_groups(some, groups, rules, rare=patient)) for some in without]
+    folds = [stepped(choose(some)) for some in without]
     return stepped(chosen), chosen.gains, folds
 
 

@@ -1,8 +1,10 @@
 """The latency from a command to its motion: commands against measured speeds, motors of any slowness allowed.
 
 The measured speeds are compared with the commands, shifted in time and passed through a first-order lag of any time
-constant. A lag only ever makes motion later and rounder, a shift alone moves its onset: so the two are told apart, and
-what is left of the latency is the pure one. Delay and the offset between two clocks are both pure latency: one number.
+constant, and turns through another. A lag only ever makes motion later and rounder, a shift alone moves its onset: so
+the two are told apart, and what is left of the latency is the pure one; without a lag of their own, drives that turn
+more than others would seem to have another clock. Delay and the offset between two clocks are both pure latency: one
+number.
 
 `clock_drift` finds two clocks that run at different rates, `stretches` where a clock jumps within a drive, and
 `deviants` the drives that have another one. A clock that jumps also puts poses on or back by the way of that time, if
@@ -10,11 +12,11 @@ the robot moves: a step between two samples, where the latency changes by as muc
 """
 
 from collections.abc import Iterator, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
-from scipy.optimize import minimize, minimize_scalar
+from scipy.optimize import minimize
 from scipy.signal import lfilter
 
 from proxytune.diagnosis.motion.drives import Drives, Floats, Whole, relative, rows_at, sum_by
@@ -25,9 +27,11 @@ SPAN_S = 0.2
 """Speeds are means over so long: pose noise is averaged out, and 0.05 s of latency is still clear."""
 MOST_SPANS = 8000
 """Of longer logs as many speeds are taken, evenly spread."""
-LONGEST_TIME_CONSTANT_S = 1.0
+LONGEST_LAG_S = 1.0
 TIME_CONSTANTS_S = (0.06, 0.25)
-"""The longest motor lag that is reckoned with, and those of a first look."""
+"""The longest lag that is reckoned with, and the motors' of a first look."""
+SIMPLEX = (0.06, 0.15, 0.3)
+"""Steps of the latency [s] and the roots of the lags of motors and turns in which the best is looked for."""
 STEP_S = 0.05
 """Latencies are tried in such steps; the best lies between them, at the vertex of a parabola."""
 ROUGH_STEP_S = 0.1
@@ -50,7 +54,7 @@ class Reaction(NamedTuple):
     """The linear, first-order robot that follows its commands best."""
 
     latency_s: float  # what latency lies beyond the motor's lag [s]
-    time_constant_s: float
+    lags_s: tuple[float, float]  # time constants: of the motors, and of turns beside that
     gains: Floats  # from commanded to measured forward speed and yaw rate (2, 2)
     spread: Floats  # deviation of what it leaves of either
     squares: Floats  # what it leaves of each span (M,), in units of the whole log's
@@ -87,39 +91,29 @@ def reaction(drives: Drives, speeds: Speeds, reach_s: float) -> Reaction:
     commanded = _CommandedSpeeds(drives, reach_s + 1.0)
     few = Speeds(*(part[::THINNED] for part in speeds))
     latencies = np.arange(-reach_s, reach_s + 1e-9, ROUGH_STEP_S).tolist()
-    looks = [look for constant in TIME_CONSTANTS_S for look in commanded.reactions(few, latencies, constant)]
-    _, latency, constant = min((_misfit(look), look.latency_s, look.time_constant_s) for look in looks)
-
-    def left(point: Floats) -> float:
-        latency_s = float(np.clip(point[0], -reach_s, reach_s))
-        return _misfit(commanded.reaction(speeds, latency_s, _constant(point[1])))
-
-    root = float(np.sqrt(constant))
-    corners = np.array([(latency, root), (latency + 0.06, root), (latency, root + 0.15)])
-    found = minimize(
-        left,
-        corners[0],
-        method="Nelder-Mead",
-        options={"xatol": 2e-3, "fatol": 1e-5, "maxfev": 60, "initial_simplex": corners},
-    )
-    return commanded.reaction(speeds, float(np.clip(found.x[0], -reach_s, reach_s)), _constant(float(found.x[1])))
+    looks = [look for constant in TIME_CONSTANTS_S for look in commanded.reactions(few, latencies, (constant, 0.0))]
+    _, latency, (constant, _) = min((_misfit(look), look.latency_s, look.lags_s) for look in looks)
+    return _close_reaction(commanded, speeds, (latency, float(np.sqrt(constant)), 0.0), (-reach_s, reach_s))
 
 
 def reaction_at(drives: Drives, speeds: Speeds, latency_s: float) -> Reaction:
     """The best reaction with this latency."""
     commanded = _CommandedSpeeds(drives, abs(latency_s))
-
-    def left(root: float) -> float:
-        return _misfit(commanded.reaction(speeds, latency_s, root**2))
-
-    bounds = (0.0, float(np.sqrt(LONGEST_TIME_CONSTANT_S)))
-    found = minimize_scalar(left, bounds=bounds, method="bounded", options={"xatol": 5e-3})
-    return commanded.reaction(speeds, latency_s, float(found.x) ** 2)
+    return _close_reaction(commanded, speeds, (latency_s, 0.3, 0.0), (latency_s, latency_s))
 
 
-def _constant(root: float) -> float:
-    """A time constant from its root: near none, a lag matters by its square."""
-    return float(min(root**2, LONGEST_TIME_CONSTANT_S))
+def _close_reaction(
+    commanded: "_CommandedSpeeds", speeds: Speeds, start: tuple[float, float, float], reach_s: tuple[float, float]
+) -> Reaction:
+    """The best reaction near a latency and the roots of both lags: near none, a lag matters by its square."""
+
+    def at(point: Floats) -> Reaction:
+        motors, turns = np.minimum(point[1:] ** 2, LONGEST_LAG_S).tolist()
+        return commanded.reaction(speeds, float(np.clip(point[0], *reach_s)), (motors, turns))
+
+    options: Any = {"xatol": 2e-3, "fatol": 1e-5, "maxfev": 90, "initial_simplex": start + np.eye(4, 3, -1) * SIMPLEX}
+    found: Any = minimize(lambda point, *_: _misfit(at(point)), np.array(start), method="Nelder-Mead", options=options)
+    return at(found.x)
 
 
 class _CommandedSpeeds:
@@ -129,10 +123,10 @@ class _CommandedSpeeds:
         self.drives = drives
         self.pad = int(np.ceil(reach_s * drives.tick_hz)) + 2
 
-    def speeds(self, speeds: Speeds, latencies_s: Sequence[float], constant_s: float) -> Floats:
-        """Mean speeds over the same spans (latencies, M, 2), so much later, of motors with this time constant."""
+    def speeds(self, speeds: Speeds, latencies_s: Sequence[float], lags_s: tuple[float, float]) -> Floats:
+        """Mean speeds over the same spans (latencies, M, 2), so much later, of motors and turns with these lags."""
         asked = np.empty((len(latencies_s), len(speeds.first), 2))
-        for own, ends, gone in self._batches(speeds, constant_s):
+        for own, ends, gone in self._batches(speeds, lags_s):
             for number, latency_s in enumerate(latencies_s):
                 late = self.pad - latency_s * self.drives.tick_hz
                 shift, part = int(np.floor(late)), late - np.floor(late)
@@ -142,7 +136,7 @@ class _CommandedSpeeds:
                 asked[number, own] = (last - first) / (speeds.last - speeds.first)[own, None]
         return asked
 
-    def _batches(self, speeds: Speeds, constant_s: float) -> Iterator[tuple[slice, Ends, Floats]]:
+    def _batches(self, speeds: Speeds, lags_s: tuple[float, float]) -> Iterator[tuple[slice, Ends, Floats]]:
         """Spans of a few episodes, where these begin and end, and how far their commands move the robot."""
         duties = self.drives.duties
         count = max(1, AT_ONCE // duties.shape[1])
@@ -151,35 +145,39 @@ class _CommandedSpeeds:
             if own.start < own.stop:
                 episode = speeds.episode[own] - begin
                 ends = (episode, speeds.first[own]), (episode, speeds.last[own])
-                yield own, ends, self._gone(slice(begin, begin + count), constant_s)
+                yield own, ends, self._gone(slice(begin, begin + count), lags_s)
 
-    def _gone(self, episodes: slice, constant_s: float) -> Floats:
+    def _gone(self, episodes: slice, lags_s: tuple[float, float]) -> Floats:
         """Motion that the commands ask for by each tick: way [m], turn [rad], times ticks a second."""
         given, figures = self.drives.duties[episodes], self.drives.robot.figures
         before = np.repeat(self.drives.rest[episodes, None], self.pad, axis=1)
         duties = np.concatenate((before, given, np.repeat(given[:, -1:], self.pad, axis=1)), axis=1)
-        kept = float(np.exp(-1.0 / (constant_s * self.drives.tick_hz))) if constant_s > 1e-4 else 0.0
-        wheels, _ = lfilter([1.0 - kept], [1.0, -kept], duties, axis=1, zi=kept * duties[:, :1])
+        wheels = self._lagged(duties, lags_s[0])
         if self.drives.robot.drive == "ackermann":
             twists = drivetrain(self.drives.robot, ()).ideal(wheels)[..., ::2]
         else:
             yaw = (wheels[..., 1] - wheels[..., 0]) / figures["effective_baseline"]
             twists = figures["full_speed"] * np.stack((wheels.mean(axis=-1), yaw), axis=-1)
+        twists[..., 1:] = self._lagged(twists[..., 1:], lags_s[1])
         return np.concatenate((np.zeros_like(twists[:, :1]), np.cumsum(twists, axis=1)), axis=1)
 
-    def reactions(self, speeds: Speeds, latencies_s: Sequence[float], constant_s: float) -> list[Reaction]:
+    def _lagged(self, signal: Floats, lag_s: float) -> Floats:
+        kept = float(np.exp(-1.0 / (lag_s * self.drives.tick_hz))) if lag_s > 1e-4 else 0.0
+        return lfilter([1.0 - kept], [1.0, -kept], signal, axis=1, zi=kept * signal[:, :1])[0]
+
+    def reactions(self, speeds: Speeds, latencies_s: Sequence[float], lags_s: tuple[float, float]) -> list[Reaction]:
         """The reaction with the best gains at each latency."""
         found, size = list[Reaction](), speeds.values.std(axis=0) + 1e-9
-        for latency_s, asked in zip(latencies_s, self.speeds(speeds, latencies_s, constant_s), strict=True):
+        for latency_s, asked in zip(latencies_s, self.speeds(speeds, latencies_s, lags_s), strict=True):
             gains = np.linalg.pinv(asked.T @ asked, hermitian=True) @ (asked.T @ speeds.values)
             rest = speeds.values - asked @ gains
             squares = ((rest / size) ** 2).sum(axis=1)
-            found.append(Reaction(latency_s, constant_s, gains, rest.std(axis=0) + 1e-9, squares))
+            found.append(Reaction(latency_s, lags_s, gains, rest.std(axis=0) + 1e-9, squares))
         return found
 
-    def reaction(self, speeds: Speeds, latency_s: float, constant_s: float) -> Reaction:
+    def reaction(self, speeds: Speeds, latency_s: float, lags_s: tuple[float, float]) -> Reaction:
         """The reaction with the best gains at one latency."""
-        (found,) = self.reactions(speeds, (latency_s,), constant_s)
+        (found,) = self.reactions(speeds, (latency_s,), lags_s)
         return found
 
 
@@ -191,7 +189,7 @@ def _misfit(found: Reaction) -> float:
 def squares_by_latency(drives: Drives, speeds: Speeds, robot: Reaction, latencies: Floats, ends: Whole) -> Floats:
     """Squares that this reaction leaves of each span at each latency (M, latencies), up to the ticks `ends` (E,)."""
     commanded = _CommandedSpeeds(drives, float(np.abs(latencies).max()))
-    asked = commanded.speeds(speeds, [robot.latency_s, *latencies.tolist()], robot.time_constant_s)
+    asked = commanded.speeds(speeds, [robot.latency_s, *latencies.tolist()], robot.lags_s)
     usual = _squares(speeds, robot, asked[0])
     left = np.empty((len(speeds.episode), len(latencies)))
     for number, latency in enumerate(latencies):

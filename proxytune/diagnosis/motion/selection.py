@@ -279,11 +279,18 @@ def _is_everywhere(one: FittedCandidate) -> bool:
 
 
 def _is_plain_form_of(one: FittedCandidate, best: FittedCandidate) -> bool:
-    """Tell whether it is the best effect's form for both wheels alike, at little loss of evidence."""
+    """Tell whether it is the best effect's form for both wheels, or a special case, at little loss of evidence."""
     if one.screened is None or best.screened is None or one is best or one.screened.candidate.form:
         return False
-    same = one.screened.candidate.effect == best.screened.candidate.effect
-    return same and one.gain > one.fitted.drives.rules.plain_share * best.gain
+    name, effect = best.screened.candidate.effect, one.screened.candidate.effect
+    special = name == effect or effect in _contained(best.fitted.drives, name)
+    return special and one.gain > one.fitted.drives.rules.plain_share * best.gain
+
+
+def _contained(drives: Drives, effect: str) -> tuple[str, ...]:
+    """The effects that are special cases of another."""
+    trace = drives.robot.catalogue.effect(effect).trace
+    return trace.contains if trace else ()
 
 
 def _is_at_edge(one: FittedCandidate) -> bool:
@@ -336,6 +343,8 @@ def _rivals(best: FittedCandidate, chosen: ScreenedCandidate, evidence: Evidence
     """Other effects with nearly as much evidence, or most of it and predictions no worse, or that do the same."""
     rules, rivals = best.fitted.drives.rules, dict[str, Candidate]()
     for one in evidence.screened:
+        if chosen.candidate.effect in _contained(best.fitted.drives, one.candidate.effect):
+            continue
         other = evidence.fits.get(one.candidate.label)
         close = other is not None and (
             other.gain > best.gain - rules.rival_nats

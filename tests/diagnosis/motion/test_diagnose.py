@@ -170,12 +170,19 @@ def test_poses_a_quarter_second_early_are_told_and_no_effect_is_invented():
 
 
 @pytest.mark.slow
-def test_what_no_usual_robot_has_is_found_with_its_value():
-    heavy = {**TRUTH, "motor_lag.time_constant": 1.6, "motor_lag.imbalance": 0.0}
-    found = diagnose(planted_log(heavy, episodes=6, seconds=20.0, noise=CALM), ROBOT, ("trim", "delay"))
-    assert (found.verdict, [effect.effect for effect in found.effects]) == ("explained", ["motor_lag"])
-    estimate = found.theta["motor_lag.time_constant"]
-    assert abs(estimate.value - 1.6) < np.ptp(estimate.interval) < 0.2
+@pytest.mark.parametrize(
+    ("effect", "asked", "held"),
+    [
+        ("motor_lag", {"motor_lag.time_constant": 1.6}, {"motor_lag.imbalance": 0.0}),
+        ("yaw_lag", {"yaw_lag": 0.3}, {}),
+        ("inertia", {"inertia.forward": 0.2, "inertia.turn": 0.3, "inertia.square": 4.0}, {"inertia.linear": 0.0}),
+    ],
+)
+def test_what_no_usual_robot_has_is_found_with_its_value_and_of_what_contains_another_the_plainer(effect, asked, held):
+    heavy = planted_log({**TRUTH, **asked, **held}, episodes=6, seconds=20.0, noise=CALM)
+    found = diagnose(heavy, ROBOT, ("trim", "delay"))
+    assert [(one.effect, one.rivals) for one in found.effects] == [(effect, ())]
+    assert {name: found.theta[name].value for name in asked} == pytest.approx(asked, rel=0.1)
     assert found.edges == ()
 
 

@@ -17,7 +17,7 @@ def answered(theta, change=lambda poses: poses):
 def test_a_slow_motor_is_told_from_latency(delay, lag):
     found = answered({"delay": delay, "motor_lag.time_constant": lag})
     assert found.latency_s == pytest.approx(delay, abs=0.02)
-    assert found.time_constant_s == pytest.approx(lag, abs=0.02 + 0.05 * lag)
+    assert found.lags_s[0] == pytest.approx(lag, abs=0.02 + 0.05 * lag)
 
 
 def test_latency_may_be_below_none_and_gains_are_what_the_robot_makes_of_commands():

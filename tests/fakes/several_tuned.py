@@ -42,10 +42,5 @@ def compared(*families, lessons=None):
 
 def lesson(plv, more=None, needed=(100.0, 80.0, 120.0)):
     """What a family is worth as a teacher, known to 10 samples."""
-    return Lesson(
-        {},
-        1.0,
-        LearningEstimate(*needed),
-        LearningEstimate(plv, plv - 10.0, plv + 10.0),
-        more and LearningEstimate(*more),
-    )
+    saved = LearningEstimate(plv, plv - 10.0, plv + 10.0)
+    return Lesson({}, 1.0, LearningEstimate(*needed), saved, more and LearningEstimate(*more))

@@ -26,7 +26,7 @@ from proxytune.diagnosis.motion.moments import Period
 from proxytune.diagnosis.motion.multistep_fit import MultistepFit
 from proxytune.driving import read_robot
 from proxytune.effects import GROUPS, FittedRange, Learnt, LearntCurve, learnt_theta
-from proxytune.report.diagnosis.document import clocks_document, learnt_document, unlike_document
+from proxytune.report.diagnosis.document import _immaterial_document, clocks_document, learnt_document, unlike_document
 from proxytune.report.diagnosis.notes import (
     VERDICTS,
     clocks_notes,
@@ -84,8 +84,7 @@ def test_effects_that_were_added_or_are_immaterial_say_their_worth_where_that_is
     (note,) = motion_notes(diagnosis(multistep=polish))
     assert "fitted to windows of 2 s" in note
     assert "1 s: 0.95, 2 s: 0.80" in note
-    value, ends = per_cent(Ratio(1.25, (0.9, 2.0)))
-    assert (value, *ends) == pytest.approx((25.0, -10.0, 100.0))
+    assert np.hstack(per_cent(Ratio(1.25, (0.9, 2.0)))) == pytest.approx((25.0, -10.0, 100.0))
     assert decisive(LITTLE) == 5.0
     assert may_matter(LITTLE, RULES.material_factor)
     assert not may_matter(SURE, RULES.material_factor)
@@ -98,9 +97,10 @@ def test_effects_that_were_added_or_are_immaterial_say_their_worth_where_that_is
     assert note.startswith(
         "not shown to matter: lateral_slip 0.0024 s, log-likelihood gain 75 nats, changes the error at 5 s by 1.0 % "
     )
-    assert motion_notes(diagnosis(negligible=(SLIP,))) == [
-        "not shown to matter: lateral_slip, log-likelihood gain 75 nats"
-    ]
+    told = _immaterial_document(SLIP, diagnosis(effect_sizes={"lateral_slip": SURE}, robot=read_robot("duckiebot")))
+    assert (told["horizon_s"], told["changes_error_by"], told["may_matter"]) == (5.0, pytest.approx(1.0), False)
+    (note,) = motion_notes(diagnosis(negligible=(SLIP,)))
+    assert note == "not shown to matter: lateral_slip, log-likelihood gain 75 nats"
 
 
 def test_the_next_drive_is_told_with_what_it_tells_and_values_beside_what_has_no_name_as_no_physics():

@@ -7,7 +7,8 @@ from readable import assert_readable
 from several_tuned import compared, family, lesson
 
 from proxytune.learning import LearningEstimate
-from proxytune.report.families import families_answer, families_figure, families_next_step
+from proxytune.report.families import _theta_cell, families_answer, families_figure, families_next_step
+from proxytune.report.study.sentence import KnownParameter
 from proxytune.study import Lesson
 
 DEAR, CHEAP = (2.0, 2.2, 1.8, 2.0), (1.0, 1.1, 0.9, 1.0)
@@ -24,16 +25,13 @@ def test_nothing_is_claimed_of_chance_of_several_families_and_a_clear_winner_or_
     assert families_next_step(found) == "use bullet to predict; its page: study/families/bullet/report.html."
     found = compared(*BOTH)
     assert "; cannot be told from it: planar +0 (" in families_answer(found)
-    assert families_next_step(found).startswith(
-        "use planar to predict, which costs least of those; to tell them apart, "
-    )
+    assert families_next_step(found).startswith("use planar to predict, which costs least of those; to tell them apart")
     found = compared(family("a", 0, CHEAP, noise=8.0), family("b", 0, CHEAP, noise=8.0))
     assert families_next_step(found) == "to tell a and b apart, raise starts and measure the target from them too."
     assert "cannot be told from it: b 1 (1 to 1)." in families_answer(found)
     found = compared(family("a", 4, noise=0.1), family("b", 4, noise=0.1))
     for one in found.families:
         object.__setattr__(one.fresh.chance, "p_value", 0.4)
-    assert found.families[0].fresh.chance.explains
     assert "To predict: none is shown to be better than chance; lowest is a, fresh PRPV" in families_answer(found)
     assert families_next_step(found).startswith("raise stop.wall_time_s (now 60)")
     found = compared(family("a", fresh=False), family("b", fresh=False))
@@ -82,3 +80,8 @@ def test_a_panel_per_use_tells_best_alike_and_worse_apart_draws_open_intervals_a
     figure = families_figure(compared(family("a" * 40), family("b", 2)))
     assert len(figure.axes) == 2
     assert figure.axes[0].get_yticklabels()[0].get_text() == f"{'a' * 15}…"
+
+
+def test_a_family_s_best_value_of_a_parameter_is_told_with_its_interval_and_one_that_it_lacks_left_out():
+    known = KnownParameter("delay", "s", 0.1, (0.05, 0.15), 0.2, identified=True)
+    assert (_theta_cell(known), _theta_cell(None)) == ("0.1 s (0.05 to 0.15)", "")

@@ -43,9 +43,9 @@ CASES = {
     "a tenfold proxy": (table(scaled(PROXY, 10)), table(TRUE), METRICS, r"distance in the proxy are \d.* times"),
     "far too much": (table(PROXY), table(scaled(TRUE, 1e60)), METRICS, r"distance in the target are .*e\+60 times"),
     "negative times": (table(scaled(PROXY, 1, -1)), table(TRUE), METRICS, r"survival_time of the proxy is below zero"),
-    "a proxy with the other sign": (
-        table(scaled(PROXY, -1)),
-        table(TRUE),
+    "a proxy of three agents with the other sign": (
+        table(scaled(PROXY[:3], -1), AGENTS[:3]),
+        table(TRUE[:3], AGENTS[:3]),
         METRICS,
         r"distance are below zero in the proxy and above it on the target",
     ),

@@ -57,9 +57,9 @@ def test_what_is_given_is_written_and_the_urdf_has_it_too(tmp_path_factory, valu
 def test_guesses_alone_are_marked_to_be_edited_and_the_six_figures_stand_first():
     text = robot_skeleton("rover", {"wheel_radius": 0.04}).files["robot.toml"].partition("[effects")[0]
     lines = {line.split(" = ")[0]: line for line in text.splitlines() if line.split(" = ")[0] in UNITS}
-    assert set(lines) == set(GUESSES["differential"])
-    assert tuple(lines)[:6] == SIX
-    assert [name for name, line in lines.items() if "# EDIT" not in line] == ["wheel_radius"]
+    assert (set(lines), tuple(lines)[:6]) == (set(GUESSES["differential"]), SIX)
+    hints = {name: f"# EDIT: {how}" for name, (_, how) in GUESSES["differential"].items()}
+    assert [name for name, line in lines.items() if hints[name] not in line] == ["wheel_radius"]
 
 
 def test_a_figure_that_it_does_not_have_is_refused():

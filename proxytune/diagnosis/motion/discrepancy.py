@@ -400,7 +400,7 @@ def learn(found: Findings, tested: Drives, horizons_s: Iterable[float]) -> Learn
 def _error(names: Theta, model: Theta, drives: Drives, horizon_s: float) -> LearntError | None:
     windows = cut(drives, horizon_s)
     blocks = blocks_of(drives, windows)
-    if len(np.unique(blocks)) < 2:
+    if len(np.unique(blocks)) < drives.rules.fewest_blocks:
         return None
     before, after = (pose_errors(drives, theta, windows) ** 2 for theta in (names, model))
     compared = ratio(after[:, 0], before[:, 0], blocks, drives.rules.ratio_p_value)

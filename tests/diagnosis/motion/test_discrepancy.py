@@ -48,14 +48,14 @@ def found(bent):
     return bent, fit_discrepancy(bent, TRUTH)
 
 
-def test_too_few_blocks_or_windows_teach_nothing():
-    drives = planted_drives(TRUTH, episodes=8, seconds=1.5)
-    learnt = fit_discrepancy(drives, TRUTH)
+def test_too_few_blocks_or_windows_teach_nothing_nor_test_it(tested):
+    learnt = fit_discrepancy(planted_drives(TRUTH, episodes=8, seconds=1.5), TRUTH)
     assert (learnt.used, dict(learnt.theta), len(learnt.held_out)) == (False, {}, 0)
-    drives = planted_drives({**TRUTH, **TURNING}, episodes=1, seconds=12.0)
-    learnt = fit_discrepancy(drives, TRUTH)
+    learnt = fit_discrepancy(planted_drives({**TRUTH, **TURNING}, episodes=1, seconds=12.0), TRUTH)
     assert (dict(learnt.theta), learnt.used) == ({}, False)
     assert len(learnt.held_out)
+    errors = [discrepancy._error(TRUTH, TRUTH, replace(tested, block=tested.block % count), 2.0) for count in (2, 3)]
+    assert [error is None for error in errors] == [True, False]
 
 
 def test_a_hidden_curve_is_learnt_by_its_signal_lowers_the_error_of_other_drives_and_passes_the_guard(found, tested):

@@ -14,7 +14,7 @@ from planted import DECLARED, NOISE, TRUTH, driven_log, drives_of, fitted, plant
 from proxytune.diagnosis import MOTION_EFFECTS, RULES, AdoptedEffect, Findings, Ratio, cut, pose_errors
 from proxytune.diagnosis.motion import effect_size as likeness
 from proxytune.diagnosis.motion.effect_size import drop_negligible, find_robot_clusters, invisible_effects
-from proxytune.diagnosis.motion.evidence import Variant
+from proxytune.diagnosis.motion.evidence import Variant, without_effect
 from proxytune.diagnosis.motion.fitting import evaluate
 from proxytune.diagnosis.motion.innovations import Noise
 
@@ -103,6 +103,8 @@ def test_what_matters_is_kept_and_the_model_is_fitted_again_without_what_does_no
     assert SLIP[0] not in weighed.model.free
     assert weighed.model.theta["yaw_scrub"] == pytest.approx(0.13, abs=0.005)
     assert weighed.negligible[0].beside.theta["lateral_slip"] == 0.002
+    bare = without_effect(Variant({"lateral_slip": 0.002}, SLIP), adopted("lateral_slip", SLIP), 20.0)
+    assert bare == Variant({}, ()), "no delay where none was"
 
 
 def test_where_everything_matters_or_windows_are_too_short_nothing_is_dropped(drives):

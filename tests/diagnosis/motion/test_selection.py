@@ -128,7 +128,7 @@ def test_most_evidence_is_chosen_unless_it_predicts_worse_or_a_part_of_the_map_h
     ("scrub", "p_value", "wanted"),
     [
         *((0.1601, p_value, "yaw_scrub" if p_value < 0.015 else None) for p_value in (0.002, 0.01, 0.02, 0.1)),
-        *((scrub, 0.002, None) for scrub in (0.14, 0.12)),
+        *((scrub, 0.002, "yaw_scrub" if scrub == 0.15 else None) for scrub in (0.15, 0.14, 0.12)),
     ],
 )
 def test_what_chance_gains_once_in_a_hundred_logs_or_predicts_worse_is_not_chosen(drives, scrub, p_value, wanted):

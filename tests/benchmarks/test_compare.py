@@ -212,8 +212,7 @@ def test_an_engine_without_its_library_is_told_before_anything_runs(tmp_path, ca
 def test_unless_named_the_engines_of_studies_are_compared_whose_library_is_there(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr(registry, "find_spec", lambda name: None)
     assert compare("analytic", *FEW[2:], "--output", tmp_path, "--json") == 0
-    rows = json.loads(capsys.readouterr().out)["engines"]
-    assert [row["engine"] for row in rows] == ["gp", "random", "sobol"]
+    assert [row["engine"] for row in json.loads(capsys.readouterr().out)["engines"]] == ["gp", "random", "sobol"]
 
 
 @pytest.mark.slow

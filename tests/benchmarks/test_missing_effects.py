@@ -64,8 +64,7 @@ def test_an_entry_is_scored_by_hand_also_where_it_names_nothing_and_refused_wher
     assert [(one.named, one.false, one.seconds) for one in found] == [(1, 0, 3.0), (0, 1, 3.0)]
     for one in found:
         assert one.ratios == pytest.approx({1: 5.0, 2: 5.0, 5: 2.5}, rel=1e-3)
-    text = table({"entry": found})
-    assert "| entry | 1 of 2 | 0.50 | 5.00, 5.00 | 5.00, 5.00 | 2.50, 2.50 | 3.0 |" in text
+    assert "| entry | 1 of 2 | 0.50 | 5.00, 5.00 | 5.00, 5.00 | 2.50, 2.50 | 3.0 |" in table({"entry": found})
     truths = read_truths(folder)
     found = score(enter(folder, None), (replace(truths[0], floor=None), truths[1]))
     assert found[0].ratios is None

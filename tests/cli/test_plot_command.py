@@ -56,8 +56,7 @@ def test_pod_is_drawn_again_without_the_target_model_also_after_other_code(make_
     model.unlink()
     monkeypatch.setattr("wobbly.Wobbly.identity", "code of another day")
     shutil.rmtree(folder / "figures")
-    named = answered("plot", folder)["figures"]
-    assert sorted(named) == sorted(str(folder / "figures" / name) for name in before)
+    assert sorted(answered("plot", folder)["figures"]) == sorted(str(folder / "figures" / name) for name in before)
     assert figures_of(folder) == before
 
 

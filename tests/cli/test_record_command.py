@@ -48,8 +48,7 @@ def test_frames_are_read_as_they_were_taken(words, capsys, tmp_path):
         True,
     )
     assert [path.name for path in frames.paths] == [f"{number:06d}.png" for number in range(12)]
-    drives = [log.episodes[drive].name for drive in frames.drives]
-    assert drives == [f"lane_{number}" for number in range(12)]
+    assert [log.episodes[drive].name for drive in frames.drives] == [f"lane_{number}" for number in range(12)]
     taken = list(filming.film(load_family(read_study_settings(tmp_path), tmp_path / "model.toml"), 12, 1))
     np.testing.assert_array_equal(read_pictures(frames, range(12)), np.concatenate([drive.pictures for drive in taken]))
     np.testing.assert_allclose(frames.times, np.concatenate([drive.times for drive in taken]), atol=1e-6)

@@ -131,8 +131,7 @@ def test_halves_are_called_halves_repeats_of_starts_a_noise_floor_and_a_constant
 
 def test_weights_unpaired_episodes_and_the_seed_are_obeyed(tables):
     base = (*SIDES, *METRIC)
-    weighted = document(*base, "--beta", "distance:2", "--beta", "time:0")
-    assert weighted["beta"] == {"distance": 2.0, "time": 0.0}
+    assert document(*base, "--beta", "distance:2", "--beta", "time:0")["beta"] == {"distance": 2.0, "time": 0.0}
     assert document(*base, "--unpaired")["episodes"]["paired"] is False
     assert document(*base)["episodes"] == {"proxy": [3, 3], "target": [3, 3], "paired": True, "resamples": 1000}
     assert document(*base, "--seed", "1") == document(*base, "--seed", "1")

@@ -94,8 +94,7 @@ def test_an_episode_is_the_same_without_numba(compiled, tmp_path, monkeypatch, p
 def test_numpy_does_it_where_told_so_and_numba_is_loaded_once_that_pays_off(compiled, monkeypatch):
     code = "from proxytune.driving.loops import by_numba; print(by_numba().__name__)"
     off = {**os.environ, "NUMBA_DISABLE_JIT": "1"}
-    told = subprocess.check_output([sys.executable, "-c", code], env=off, text=True)
-    assert told == "proxytune.driving.loops\n"
+    assert subprocess.check_output([sys.executable, "-c", code], env=off, text=True) == "proxytune.driving.loops\n"
     monkeypatch.setattr(loops, "_used", [loops.PAYS_OFF - 20])
     assert [loops.fastest(10) for _ in range(4)] == [loops, loops, compiled, compiled]
 

@@ -14,8 +14,7 @@ from proxytune.effects.effect import FEW, low_pass, low_pass_at, reckon, start_r
 
 
 def test_beyond_what_is_known_the_rates_lead_on_in_chunks_as_in_one():
-    context = FilterContext(2.0, np.zeros(3), {})
-    known = start_reckoning(np.array([1.0, 5.0]), context)
+    known = start_reckoning(np.array([1.0, 5.0]), FilterContext(2.0, np.zeros(3), {}))
     whole, _ = reckon(np.full(4, 2.0), known)
     np.testing.assert_allclose(whole, [1.0, 5.0, 6.0, 7.0])
     first, later = reckon(np.full(3, 2.0), known)

@@ -217,8 +217,7 @@ def test_weights_are_read_by_their_names_and_labelled_as_no_physics(tmp_path):
     assert theta["learnt.range.yaw@high"] == 3.5
     assert len(theta) == 4 + 8 + 2 + 2
     assert [effect.name for effect in effects_from(theta, read_robot("duckiebot").figures)] == ["learnt"]
-    text = model_text(read_model(write(tmp_path, GOOD)))
-    assert f"# {LABEL}" in text
+    assert f"# {LABEL}" in model_text(read_model(write(tmp_path, GOOD)))
     assert "not physics" in LABEL
 
 

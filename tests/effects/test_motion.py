@@ -67,16 +67,16 @@ def test_baselines_and_markers_turn_what_they_say_alone_and_a_fast_robot_turns_l
     np.testing.assert_allclose(filtered(motion.YawLag(0.2), turning, rest=turning[0]), turning)
 
 
-@pytest.mark.parametrize(("v", "damping"), [(0.0, 1.0), (0.4, 1.72), (-0.4, 0.92), (-9.0, 0.05)])
-def test_a_body_lags_behind_its_wheels_and_turns_less_and_sooner_where_the_floor_resists(v, damping):
+@pytest.mark.parametrize(("v", "square", "damping"), [(0.4, 2.0, 1.72), (-0.4, 2.0, 0.92), (-9.0, 0.0, 0.05)])
+def test_a_body_lags_behind_its_wheels_and_turns_less_and_sooner_where_the_floor_resists(v, square, damping):
     twist = np.tile((v, 0.1, 2.0), (600, 1))
-    moved = filtered(motion.Inertia(0.2, 0.3, 1.0, 2.0 if v > -1.0 else 0.0), twist, rest=(v, 0.1, 0.0))
-    late = 0.3 / damping * (1.0 - np.exp(-600 / RATE_HZ * damping / 0.3))
-    np.testing.assert_allclose(moved[:, :2], twist[:, :2], atol=1e-12)
-    assert moved[:, 2].sum() / RATE_HZ == pytest.approx(2.0 / damping * (600 / RATE_HZ - late), rel=1e-9)
-    begun = filtered(motion.Inertia(0.2, 0.3, 0.0, 0.0), twist)
-    np.testing.assert_allclose(begun[:, 2], filtered(motion.YawLag(0.3), twist)[:, 2], atol=1e-12)
-    np.testing.assert_allclose(begun[:, 0], filtered(motion.YawLag(0.2), twist[:, ::-1])[:, 2], atol=1e-12)
+    moved = filtered(motion.Inertia(0.2, 0.3, 1.0, square), twist, rest=(v, 0.1, 0.0))
+    late = 0.3 / damping * (1.0 - np.exp(-10.0 * damping / 0.3))
+    np.testing.assert_allclose(moved.mean(axis=0), (v, 0.1, 2.0 / damping * (1.0 - late / 10.0)), rtol=1e-9)
+    yaw, pushed = (filtered(motion.YawLag(lag), signal)[:, 2] for lag, signal in ((0.3, twist), (0.2, twist[:, ::-1])))
+    np.testing.assert_allclose(
+        filtered(motion.Inertia(0.2, 0.3, 0.0, 0.0), twist)[:, ::2], np.c_[pushed, yaw], atol=1e-12
+    )
 
 
 @pytest.mark.parametrize(("yaw", "forward"), [(0.0, 0.5), (2.0, 0.3), (-2.0, 0.3), (9.0, 0.0)])

@@ -38,8 +38,7 @@ def test_the_group_that_gains_most_is_chosen_first_and_curves_over_two_signals_p
     assert list(chosen.gains) == ["other", "one"]
     assert chosen.gains["other"] > chosen.gains["one"] > 0.0
     assert min(RIDGES) < FIRMEST_ONLY["speed_and_turn"] <= max(RIDGES)
-    truth = np.concatenate((np.zeros(7), 0.3 * np.ones(8)))
-    given = summed(slopes(truth, noise=0.0))
+    given = summed(slopes(np.concatenate((np.zeros(7), 0.3 * np.ones(8))), noise=0.0))
     assert np.all(np.abs(choose_groups(given, COLUMNS, RULES).weights[7:]) < 0.95 * 0.3)
     load, duty = (choose_groups(given, {name: slice(7, 15)}, RULES).weights[7:] - 0.3 for name in ("load", "duty"))
     assert 0.0 < np.abs(duty).max() < 0.1 * np.abs(load).max(), "correlated weights are pulled less"

@@ -171,17 +171,17 @@ def test_poses_a_quarter_second_early_are_told_and_no_effect_is_invented():
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("effect", "asked", "held"),
+    "asked",
     [
-        ("motor_lag", {"motor_lag.time_constant": 1.6}, {"motor_lag.imbalance": 0.0}),
-        ("yaw_lag", {"yaw_lag": 0.3}, {}),
-        ("inertia", {"inertia.forward": 0.2, "inertia.turn": 0.3, "inertia.square": 4.0}, {"inertia.linear": 0.0}),
+        {"motor_lag.time_constant": 1.6},
+        {"yaw_lag": 0.3},
+        {"inertia.forward": 0.2, "inertia.turn": 0.3, "inertia.square": 4.0},
     ],
 )
-def test_what_no_usual_robot_has_is_found_with_its_value_and_of_what_contains_another_the_plainer(effect, asked, held):
-    heavy = planted_log({**TRUTH, **asked, **held}, episodes=6, seconds=20.0, noise=CALM)
+def test_what_no_usual_robot_has_is_found_with_its_value_and_of_what_contains_another_the_plainer(asked):
+    heavy = planted_log({**TRUTH, **asked}, episodes=6, seconds=20.0, noise=CALM)
     found = diagnose(heavy, ROBOT, ("trim", "delay"))
-    assert [(one.effect, one.rivals) for one in found.effects] == [(effect, ())]
+    assert [(one.effect, one.rivals) for one in found.effects] == [(next(iter(asked)).split(".")[0], ())]
     assert {name: found.theta[name].value for name in asked} == pytest.approx(asked, rel=0.1)
     assert found.edges == ()
 

@@ -125,8 +125,7 @@ def test_logs_without_two_poses_in_a_row_or_commands_are_refused_and_travel_is_t
     ],
 )
 def test_every_kind_of_command_becomes_a_fraction_of_full_speed(command, given, duty):
-    commands = np.array([given, given])
-    np.testing.assert_allclose(duties_of(log(command=command), ROBOT, commands), [duty, duty])
+    np.testing.assert_allclose(duties_of(log(command=command), ROBOT, np.array([given, given])), [duty, duty])
 
 
 @pytest.mark.parametrize(("command", "given"), [("twist", (0.5, 2.0)), ("wheel_speed", (19.0, 0.0))])

@@ -252,8 +252,7 @@ def test_windows_cover_every_increment_once_but_for_short_ends(long, horizon_s):
     windows = cut(long, horizon_s)
     assert len(np.unique(windows.increment)) == len(windows.increment)
     left = np.setdiff1d(np.arange(len(long.episode)), windows.increment)
-    runs = int((~long.linked).sum())
-    assert len(left) <= runs * windows_module.SHORTEST * horizon_s * 20.0
+    assert len(left) <= int((~long.linked).sum()) * windows_module.SHORTEST * horizon_s * 20.0
     assert len(windows.begin) >= long.seconds / horizon_s * 0.6
 
 

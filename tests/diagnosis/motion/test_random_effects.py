@@ -94,8 +94,7 @@ def test_the_times_are_weighed_as_their_likelihoods_add_up_however_far_apart_the
     late = RANDOM_EFFECTS["dropped_commands"].lateness(0.2, 1.0)
     pull, energy = np.array([-900.0, 0.3, 900.0]), np.array([1.0, 2.0, 40.0])
     each = [w - k * pull - 0.5 * k**2 * energy for k, w in zip(late.commands, late.log_weights, strict=True)]
-    wanted = np.logaddexp.reduce(each, axis=0)
-    np.testing.assert_allclose(_mixture(late, pull, energy), wanted, rtol=1e-12)
+    np.testing.assert_allclose(_mixture(late, pull, energy), np.logaddexp.reduce(each, axis=0), rtol=1e-12)
 
 
 @pytest.mark.slow

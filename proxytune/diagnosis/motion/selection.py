@@ -42,7 +42,7 @@ from proxytune.diagnosis.motion.evidence import (
 )
 from proxytune.diagnosis.motion.fitting import KEPT_SOLVABLE, Fit, derivatives_by_block, fit, held_out_log_likelihood
 from proxytune.diagnosis.motion.innovations import at_edge, huber, lateness, span, widened
-from proxytune.diagnosis.motion.prediction import blocks_of, cut, pose_errors, ratio
+from proxytune.diagnosis.motion.prediction import Ratio, blocks_of, cut, pose_errors, ratio
 from proxytune.diagnosis.motion.random_effects import RandomEffect, infer_size_indirectly
 from proxytune.diagnosis.motion.screening import Candidate, ScreenedCandidate, candidates, screen
 from proxytune.diagnosis.motion.signals import SignalCurve, fit_curves
@@ -253,7 +253,7 @@ def choose_best(model: Fit, evidence: Evidence, least: float, p_value: float | N
     ranked = sorted(everything, key=lambda one: -one.gain)
     # Generators: a random effect costs a fit, which is made only once its turn comes.
     enough = (_fitted(model, one) for one in ranked if one.gain >= least)
-    best = next((one for one in enough if predicts_no_worse(one.fitted, model)), None)
+    best = next((one for one in enough if _predicts_well_enough(one, model)), None)
     if best is None:
         return None
     plain = next((one for one in named if _is_plain_form_of(one, best)), best)
@@ -287,6 +287,16 @@ def _is_plain_form_of(one: FittedCandidate, best: FittedCandidate) -> bool:
     return special and one.gain > one.fitted.drives.rules.plain_share * best.gain
 
 
+def _predicts_well_enough(one: FittedCandidate, model: Fit) -> bool:
+    """Tell whether an effect predicts no worse than the model, and better where it contains an effect of the model."""
+    if one.screened and {effect_of(name) for name in model.theta}.intersection(
+        _contained(model.drives, one.screened.candidate.effect)
+    ):
+        compared = _compare_predictions(one.fitted, model)
+        return compared is None or compared.below
+    return predicts_no_worse(one.fitted, model)
+
+
 def _contained(drives: Drives, effect: str) -> tuple[str, ...]:
     """The effects that are special cases of another."""
     trace = drives.robot.catalogue.effect(effect).trace
@@ -315,12 +325,18 @@ def fit_random(model: Fit, effect: RandomEffect) -> FittedCandidate:
 
 def predicts_no_worse(one: Fit, other: Fit) -> bool:
     """Tell whether one model's error over windows is not shown to exceed the other's beyond the guard's factor."""
+    compared = _compare_predictions(one, other)
+    return compared is None or compared.interval[0] <= other.drives.rules.guard_factor
+
+
+def _compare_predictions(one: Fit, other: Fit) -> Ratio | None:
+    """The ratio of one model's error over windows to another's; None where drives are too short for windows."""
     drives = other.drives
     windows = cut(drives, drives.rules.guard_horizon_s)
     if len(windows.begin) < 2:
-        return True  # drives too short for windows: single steps are all there is to go by
+        return None
     squares = [pose_errors(fitted.drives, fitted.theta, windows)[:, 0] ** 2 for fitted in (one, other)]
-    return ratio(squares[0], squares[1], blocks_of(drives, windows)).interval[0] <= drives.rules.guard_factor
+    return ratio(squares[0], squares[1], blocks_of(drives, windows))
 
 
 def adopt(adopted: list[AdoptedEffect], best: FittedCandidate, evidence: Evidence) -> list[AdoptedEffect]:

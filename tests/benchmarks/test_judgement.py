@@ -181,5 +181,4 @@ def test_the_curve_is_the_median_of_the_lowest_so_far_and_an_interval_covers_as_
 
 @pytest.mark.parametrize("line", [b"\xff\xfe", b"[" * 20_000, b"[]", b"3", b"{}"])
 def test_spoilt_lines_of_finished_runs_are_skipped(write_file, line):
-    path = write_file(line + b"\n", "runs.jsonl")
-    assert read_runs(path) == {}
+    assert read_runs(write_file(line + b"\n", "runs.jsonl")) == {}

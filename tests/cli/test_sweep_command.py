@@ -52,8 +52,7 @@ def test_trials_and_sweeps_share_episodes_and_a_finished_study_is_swept_at_its_b
     at = ",".join(f"{name}={value!r}" for name, value in theta.items())
     assert answered("sweep", finished, "--parameter", "trim", "--points", "2", "--at", at)["episodes"]["run"] == 2 * 18
     best = answered("study", finished)["best"]["theta"]
-    arguments = ["sweep", str(finished), "--parameter", "trim", "--points", "2"]
-    document = answered(*arguments)
+    document = answered(*["sweep", str(finished), "--parameter", "trim", "--points", "2"])
     assert document["at"] == {"chosen": "best", "theta": best}
     assert document["curves"][0]["base"] == best
 

@@ -78,8 +78,7 @@ def pushes(seed, steps=80, disturbance=DISTURBANCE):
 @pytest.mark.slow
 @pytest.mark.parametrize("theta", [NOMINAL, SHIFTED], ids=("nominal", "shifted"))
 def test_undisturbed_it_keeps_both_wheels_in_the_lane_from_all_ten_starts(theta):
-    scores = [score(lesson(start, theta)) for start in range(len(ROAD.starts))]
-    assert scores == pytest.approx([SECONDS] * 10)
+    assert [score(lesson(start, theta)) for start in range(len(ROAD.starts))] == pytest.approx([SECONDS] * 10)
 
 
 @pytest.mark.parametrize("outer", [True, False])

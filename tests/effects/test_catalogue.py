@@ -157,8 +157,7 @@ def test_delay_is_exact_for_whole_samples_and_splits_one_between_them(seconds, e
 
 def test_delay_and_blur_are_continuous_in_their_values():
     signal = np.random.default_rng(0).uniform(-1, 1, (50, 2))
-    values = np.linspace(0.0, 0.3, 301)
-    outputs = np.array([run(Delay(value), signal) for value in values])
+    outputs = np.array([run(Delay(value), signal) for value in np.linspace(0.0, 0.3, 301)])
     assert np.abs(np.diff(outputs, axis=0)).max() < 2 * 0.001 * 10.0 + 1e-9
     scene = np.random.default_rng(1).uniform(0, 255, (20, 4))
     outputs = np.array([run(Blur(value), scene)[10:] for value in np.linspace(0.01, 0.4, 800)])

@@ -87,8 +87,7 @@ def test_stiction_is_to_the_last_bit_the_same_compiled(monkeypatch, batch, rever
 
 def test_a_gear_turns_half_its_gap_before_the_wheel_starts_and_all_of_it_when_it_reverses():
     # 0.05 of full speed for 0.1 s is 0.1 rad
-    duties = np.array([0.05] * 4 + [-0.05] * 6)
-    turned = run(Backlash(0.4, 0.0), duties)[:, 0].cumsum() * FULL_RAD_S / RATE_HZ
+    turned = run(Backlash(0.4, 0.0), np.array([0.05] * 4 + [-0.05] * 6))[:, 0].cumsum() * FULL_RAD_S / RATE_HZ
     np.testing.assert_allclose(turned, [0, 0, 0.1, 0.2, 0.2, 0.2, 0.2, 0.2, 0.1, 0.0], atol=1e-12)
 
 

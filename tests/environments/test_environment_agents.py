@@ -69,8 +69,7 @@ def test_discrete_actions_run_and_an_answer_must_be_one_or_is_cut_off_in_a_box(t
     assert ask_agent(lambda seen: np.array(2), None, space, 0) == 2
     with pytest.raises(EpisodeError, match=r"answered 0 at step 4, which is not in Discrete"):
         ask_agent(lambda seen: 0, None, space, 4)
-    action = ask_agent(lambda seen: [[5.0, -0.5]], None, Box(-1.0, 1.0, (2,), np.float32), 0)
-    assert action.tolist() == [1.0, -0.5]
+    assert ask_agent(lambda seen: [[5.0, -0.5]], None, Box(-1.0, 1.0, (2,), np.float32), 0).tolist() == [1.0, -0.5]
     assert run(family(tmp_path, SCREEN), "toys:left_of_middle")["return"] >= 4.0
 
 

@@ -270,8 +270,7 @@ def test_every_error_of_the_tape_has_a_place_of_its_own(stretches):
     shifts = tape.shift(stretch, line)
     tilts = tape.tilt(stretch[line < gathering.TILTED], line[line < gathering.TILTED])
     white, yellow = np.array([True, False, False]), np.array([0, 2, 3])
-    places = np.concatenate((shifts, tilts, tape.width(white, yellow)))
-    assert sorted(places.tolist()) == list(range(tape.size))
+    assert sorted(np.concatenate((shifts, tilts, tape.width(white, yellow))).tolist()) == list(range(tape.size))
     # Both white lines have one width
     assert tape.width(np.array([True]), np.array([0])) == tape.width(np.array([True]), np.array([1]))
 

@@ -66,8 +66,7 @@ def test_commands_that_never_change_or_a_model_that_explains_all_show_no_random_
     found = answers(base)
     assert np.median(np.abs(found.gradient) / found.size) < 0.1
     drives = planted_drives(TRUTH, episodes=2, seconds=10.0)
-    still = replace(drives, duties=np.full_like(drives.duties, 0.4), rest=np.full_like(drives.rest, 0.4))
-    base = fitted(still)
+    base = fitted(replace(drives, duties=np.full_like(drives.duties, 0.4), rest=np.full_like(drives.rest, 0.4)))
     assert len(answers(base).size) == 0
     assert random_effects(base, 1) == ()
 

@@ -176,8 +176,7 @@ def test_a_mirror_swaps_left_and_right_and_nothing_else():
 def test_free_parameters_are_projected_out_of_stretches_within_episodes():
     random = np.random.default_rng(1)
     slopes, columns, weight = random.random((60, 2)), random.random((60, 3)), random.random(60) > 0.3
-    left = project_out(slopes, columns, weight)
-    np.testing.assert_allclose(slopes[weight].T @ left[weight], 0.0, atol=1e-9)
+    np.testing.assert_allclose(slopes[weight].T @ project_out(slopes, columns, weight)[weight], 0.0, atol=1e-9)
     np.testing.assert_allclose(project_out(slopes, slopes @ random.random((2, 1)), weight), 0.0, atol=1e-9)
     assert project_out(np.empty((60, 0)), columns, weight) is columns
 

@@ -97,12 +97,15 @@ def test_an_effect_that_does_nothing_beside_the_last_one_is_dropped_and_one_that
     assert model.theta["yaw_scrub"] == pytest.approx(0.13, abs=0.005)
 
 
-def chosen(drives, *tried, p_value=0.002, random=()):
-    """What is chosen of effects, each with its values and its gain."""
-    model = evaluate(drives, TRUTH, DECLARED, NOISE)
+RESISTED = "inertia (turning is resisted by speed)"
+
+
+def chosen(drives, *tried, p_value=0.002, random=(), had=TRUTH):
+    """What is chosen of effects, each with its values and its gain, for a model that had these."""
+    model = evaluate(drives, had, DECLARED, NOISE)
     fits = {}
     for label, values, gain in tried:
-        model_with = evaluate(drives, {**TRUTH, **values}, DECLARED + FORMS[label].free, NOISE)
+        model_with = evaluate(drives, {**had, **values}, DECLARED + FORMS[label].free, NOISE)
         fits[label] = FittedCandidate(gain, model_with, screened_with(label, gain, p_value))
     best = choose_best(model, Evidence([], fits, random, []), 15.0)
     return best and best.screened.candidate.label
@@ -146,6 +149,13 @@ def test_a_form_for_both_wheels_is_preferred_to_one_for_a_single_wheel_at_little
     one = ("dead_band (left wheel)", {"dead_band.width": 0.001, "dead_band.imbalance": 0.001}, 90.0)
     both = ("dead_band", {"dead_band.width": 0.001, "dead_band.imbalance": 0.0}, gain)
     assert chosen(drives, one, both) == wanted
+
+
+def test_one_that_contains_another_gives_way_to_it_at_little_loss_and_beside_it_has_to_predict_better(drives):
+    heavy = (RESISTED, {f"inertia.{name}": 0.001 for name in ("forward", "turn", "linear")}, 90.0)
+    assert [chosen(drives, heavy, ("yaw_lag", {"yaw_lag": 0.001}, gain)) for gain in (85, 40)] == ["yaw_lag", RESISTED]
+    assert chosen(drives, heavy, had={**TRUTH, "yaw_lag": 0.001}) is None
+    assert chosen(drives, (RESISTED, {**heavy[1], "yaw_lag": 0.0}, 90.0), had={**TRUTH, "yaw_lag": 0.3}) == RESISTED
 
 
 @pytest.mark.parametrize(("gain", "wanted"), [(85.0, "yaw_scrub"), (40.0, "motor_lag")])

@@ -182,7 +182,7 @@ def test_what_no_usual_robot_has_is_found_with_its_value_and_of_what_contains_an
     heavy = planted_log({**TRUTH, **asked}, episodes=6, seconds=20.0, noise=CALM)
     found = diagnose(heavy, ROBOT, ("trim", "delay"))
     assert [(one.effect, one.rivals) for one in found.effects] == [(next(iter(asked)).split(".")[0], ())]
-    assert {name: found.theta[name].value for name in asked} == pytest.approx(asked, rel=0.1)
+    assert {name: found.theta[name].value for name in asked} == pytest.approx(asked, rel=0.15)
     assert found.edges == ()
 
 

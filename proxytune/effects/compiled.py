@@ -1,4 +1,4 @@
-"""Filters of long signals compiled by Numba: `effect.low_pass` and `friction.Stiction`, operation by operation."""
+"""Filters of long signals compiled by Numba, operation by operation as `effect` and `friction.Stiction` have them."""
 
 from typing import Any
 
@@ -29,6 +29,25 @@ def _filter(signal, remainder, mean_remainder, last, mean):  # type: ignore[no-u
                 mean[row, sample, channel] = new + mean_remainder * (was - new)
                 end = rest[row, channel] + gain * new
                 rest[row, channel], last[row, channel] = 0.0 * new + remainder * end, end
+
+
+def approach(goal: NDArray[Any], kept: NDArray[Any], value: NDArray[Any]) -> tuple[Any, Any]:
+    """Go towards a goal (…, time), of which each sample keeps a share of the way: where each starts, and the end."""
+    starts, end = np.empty(goal.shape), np.array(value, dtype=float, order="C")
+    _near(
+        goal.reshape(-1, goal.shape[-1]),
+        kept.reshape(-1, goal.shape[-1]),
+        end.reshape(-1),
+        starts.reshape(-1, goal.shape[-1]),
+    )
+    return starts, end
+
+
+def _come_near(goal, kept, end, starts):  # type: ignore[no-untyped-def]
+    for row in range(goal.shape[0]):
+        for sample in range(goal.shape[1]):
+            share, starts[row, sample] = kept[row, sample], end[row]
+            end[row] = (1.0 - share) * goal[row, sample] + share * end[row]
 
 
 def trigger(signal: NDArray[Any], thresholds: NDArray[Any], sample: NDArray[Any], moving: Flags) -> tuple[Any, Any]:
@@ -62,4 +81,6 @@ def _pass(signal, thresholds, before, on, passed):  # type: ignore[no-untyped-de
 _compiled: dict[str, Any] = {"nopython": True, "nogil": True, "cache": True, "error_model": "numpy"}
 _ROWS, _LAST = "float64[:,:,:]", "float64[:,::1]"
 _follow = numba.jit(f"void({_ROWS}, float64, float64, {_LAST}, float64[:,:,::1])", **_compiled)(_filter)
+_TABLE = "float64[:,:]"
+_near = numba.jit(f"void({_TABLE}, {_TABLE}, float64[::1], float64[:,::1])", **_compiled)(_come_near)
 _switch = numba.jit(f"void({_ROWS}, {_LAST}, {_LAST}, boolean[:,::1], float64[:,:,::1])", **_compiled)(_pass)

@@ -326,6 +326,18 @@ def low_pass(signal: Signal, state: LowPassState) -> tuple[Signal, LowPassState]
     return mean, LowPassState(ends[..., -1, :], remainder, mean_remainder)
 
 
+def approach(goal: Signal, kept: Signal, value: Signal) -> tuple[Signal, Signal]:
+    """Go towards a goal (…, time), of which each sample keeps a share of the way: where each starts, and the end."""
+    value = np.broadcast_to(value, goal.shape[:-1])
+    if compiled := fastest(goal.size):
+        return compiled.approach(goal, kept, value)  # type: ignore[no-any-return]
+    shares, ends = (np.moveaxis(part, -1, 0).copy() for part in (kept, (1.0 - kept) * goal))
+    values = np.concatenate((value[None], ends))
+    for number, share in enumerate(shares):
+        values[number + 1] += share * values[number]
+    return np.moveaxis(values[:-1], 0, -1), values[-1]
+
+
 class DeadReckoning(NamedTuple):
     """Values known beforehand (…, n), number of the next sample, its value (…, 1), and samples per second."""
 

@@ -21,6 +21,7 @@ from proxytune.effects.effect import (
     Signal,
     Stage,
     Trace,
+    approach,
     effect,
     like,
     low_pass,
@@ -192,12 +193,8 @@ class Inertia(ShippedEffect):
         if self.turn:
             samples = self.turn * memory.rate_hz / damping
             kept = np.exp(-1.0 / samples)
-            shares, gains = (np.moveaxis(part, -1, 0).copy() for part in (kept, (1.0 - kept) * steady))
-            values = np.concatenate((np.asarray(yaw)[None], gains))
-            for number, share in enumerate(shares):
-                values[number + 1] += share * values[number]
-            yaw = values[-1]
-            steady = steady + samples * (1.0 - kept) * (np.moveaxis(values[:-1], 0, -1) - steady)
+            starts, yaw = approach(steady, kept, yaw)
+            steady = steady + samples * (1.0 - kept) * (starts - steady)
         return np.stack((pushed[..., 0], signal[..., 1], steady), axis=-1), memory._replace(forward=after, yaw=yaw)
 
     def _damping(self, forward: Signal) -> Signal:

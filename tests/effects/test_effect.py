@@ -52,13 +52,13 @@ def test_many_samples_follow_to_the_last_bit_as_compiled(length, channels, batch
     random = np.random.default_rng(length)
     signal = random.standard_normal((*batch, length, channels + 1))[..., 1:]
     signal[..., : length // 2, :] = 0.0
-    state = low_pass_at(random.standard_normal((*batch, channels)), lasts)
-    ways = []
+    state, ways = low_pass_at(random.standard_normal((*batch, channels)), lasts), []
     for used in (-np.inf, effect.PAYS_OFF):
         with pytest.MonkeyPatch.context() as patched:
             patched.setattr(effect, "_filtered", [used])
             mean, end = low_pass(signal, state)
-        ways.append((mean.tobytes(), end.value.tobytes(), end.value.shape, end[1:]))
+            starts, last = effect.approach(signal[..., 0], np.exp(-(signal[..., 0] ** 2)), state.value[..., 0])
+        ways.append((starts.tobytes(), last.tobytes(), mean.tobytes(), end.value.tobytes(), end.value.shape, end[1:]))
     assert ways[0] == ways[1]
 
 

@@ -234,13 +234,12 @@ def _fit_curves(task: _Task, patient: bool) -> tuple[Theta, Mapping[str, float],
                 break
             active, since = set(chosen.gains), len(left) - 1
         # All are offered again after the first step, which is the longest, where the chosen ones settled, and at last.
-        settled = len(left) in (1, ROUNDS - 1) or min(left[-2:]) > SETTLED * min(left[since:-2], default=np.inf)
-        kept = settled | np.isin(names, [*active, LEVEL, MODEL])
+        every = len(left) in (1, ROUNDS - 1) or min(left[-2:]) > SETTLED * min(left[since:-2], default=np.inf)
+        kept = every | np.isin(names, [*active, LEVEL, MODEL])
+        offered = replace(offer, curves=tuple(curve for curve in offer.curves if curve.group in names[kept]))
         now = stepped(chosen)
         chosen.weights[own] = 0.0
-        some = tuple(curve for curve in offer.curves if settled or curve.group in {*active, LEVEL})
-        to = replace(offer, curves=some)
-        given, errors = _linearise(drives, {**task.theta, **now}, to, moving, chosen.weights[kept])
+        given, errors = _linearise(drives, {**task.theta, **now}, offered, moving, chosen.weights[kept])
     fold = np.arange(_parts(drives)) % FOLDS
     without = [given.only(np.flatnonzero(fold != one)) for one in range(FOLDS)]
     folds = [stepped(choose(some)) for some in without]

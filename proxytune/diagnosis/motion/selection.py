@@ -289,9 +289,8 @@ def _is_plain_form_of(one: FittedCandidate, best: FittedCandidate) -> bool:
 
 def _predicts_well_enough(one: FittedCandidate, model: Fit) -> bool:
     """Tell whether an effect predicts no worse than the model, and better where it contains an effect of the model."""
-    if one.screened and {effect_of(name) for name in model.theta}.intersection(
-        _contained(model.drives, one.screened.candidate.effect)
-    ):
+    contained = _contained(model.drives, one.screened.candidate.effect) if one.screened else ()
+    if contained and any(effect_of(name) in contained for name in model.theta):
         compared = _compare_predictions(one.fitted, model)
         return compared is None or compared.below
     return predicts_no_worse(one.fitted, model)

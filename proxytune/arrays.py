@@ -2,7 +2,8 @@
 
 import functools
 import sys
-from contextlib import AbstractContextManager
+from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib import import_module
 from types import ModuleType
 from typing import Any
@@ -26,10 +27,14 @@ def compiled_loops(module: str) -> ModuleType | None:
         return None
 
 
-def one_thread() -> AbstractContextManager[Any]:
-    """Have libraries use one thread meanwhile."""
-    limited: AbstractContextManager[Any] = _libraries(len(sys.modules)).limit(limits=1)
-    return limited
+@contextmanager
+def one_thread() -> Iterator[None]:
+    """Have libraries use one thread meanwhile; also a decorator.
+
+    Threads that share small matrices wait for each other: on a busy machine a diagnosis took five times as long.
+    """
+    with _libraries(len(sys.modules)).limit(limits=1):
+        yield
 
 
 @functools.lru_cache(maxsize=1)

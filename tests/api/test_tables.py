@@ -103,8 +103,7 @@ def test_a_table_that_was_read_before_may_be_either_side(by_command):
     read = read_scores(str(paths[0]), ["time", "distance"])
     mixed = score(proxy=read, target=target, metrics=METRICS)
     assert documented(mixed) == documented(score(proxy=proxy, target=target, metrics=METRICS))
-    told = complaint_of(score, proxy=read, target=target, metrics="speed:max")
-    assert told.startswith("proxy: no metric 'speed'")
+    assert complaint_of(score, proxy=read, target=target, metrics="speed:max").startswith("proxy: no metric 'speed'")
 
 
 def spoilt(**changes):

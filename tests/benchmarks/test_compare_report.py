@@ -69,8 +69,7 @@ def test_engines_keep_colours_of_their_own_whether_known_or_not():
 
 @pytest.mark.parametrize("wish", [Look("blurple"), Look("#D55E00", "wavy")])
 def test_a_look_that_cannot_be_drawn_is_one_of_the_palette(wish, monkeypatch):
-    odd = Engine("odd", "odd", "proposes oddly", Sobol, look=wish)
-    monkeypatch.setattr(compared_engines, "PEERS", (odd,))
+    monkeypatch.setattr(compared_engines, "PEERS", (Engine("odd", "odd", "proposes oddly", Sobol, look=wish),))
     assert looks_of(["odd"])["odd"] in compare_report.PALETTE
 
 

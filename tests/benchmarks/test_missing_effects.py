@@ -214,8 +214,7 @@ def test_a_real_case_goes_through_write_two_entries_and_score(tmp_path):
     entries = tmp_path / "entries"
     run("baselines.py", tmp_path, entries, "--baselines", "nominal,proxytune")
     text = run("score.py", tmp_path, entries / "nominal", entries / "proxytune")
-    truths = read_truths(tmp_path)
-    ours, theirs = (score(entries / name, truths)[0] for name in ("proxytune", "nominal"))
+    ours, theirs = (score(entries / name, read_truths(tmp_path))[0] for name in ("proxytune", "nominal"))
     assert (ours.named, ours.false) == (1, 0)
     assert ours.ratios[2] < 1.2 < theirs.ratios[2]
     assert "| nominal | names none |" in text

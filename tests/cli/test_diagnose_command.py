@@ -152,8 +152,7 @@ def test_an_effect_that_is_declared_is_not_missing_in_another_log_either(home, p
 @pytest.mark.slow
 def test_a_robot_of_the_logs_own_geometry_is_diagnosed_and_its_model_predicts(tmp_path, answered):
     log = replace(small_log(), robot="my_robot")
-    own = {"wheel_radius_m": 0.0318, "baseline_m": 0.16, "full_speed_m_s": 0.6}
-    folder = write_log(log, tmp_path / "log", **own)
+    folder = write_log(log, tmp_path / "log", **{"wheel_radius_m": 0.0318, "baseline_m": 0.16, "full_speed_m_s": 0.6})
     answered("diagnose", folder, "--declared", "trim,delay,motor_lag", "--output", tmp_path / "o")
     model = tmp_path / "o" / "model.toml"
     assert read_model(model).geometry == {"wheel_radius": 0.0318, "effective_baseline": 0.16, "full_speed": 0.6}

@@ -36,8 +36,7 @@ def without_costs(document):
     for one in document["families"].values():
         for key in ("seconds", "seconds_per_episode", "seconds_per_episode_interval"):
             del one[key]
-    timed = ("sentence", "best", *THIS_RUN)
-    return {key: value for key, value in document.items() if key not in timed}
+    return {key: value for key, value in document.items() if key not in ("sentence", "best", *THIS_RUN)}
 
 
 @pytest.fixture(scope="module")

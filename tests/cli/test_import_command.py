@@ -90,8 +90,7 @@ def model(tmp_path):
 
 def test_predict_takes_a_table_as_it_is_at_its_poses_own_times(answered, model, tmp_path):
     home = foreign_robot.write_form(tmp_path, "csv", [foreign_robot.drive(5, seconds=20.0)])
-    told = answered("predict", model, home / "run0.csv", "--output", tmp_path / "poses.csv")
-    assert told["error"]["value"] < 0.0035
+    assert answered("predict", model, home / "run0.csv", "--output", tmp_path / "poses.csv")["error"]["value"] < 0.0035
 
 
 @pytest.mark.slow

@@ -72,8 +72,7 @@ def test_a_sweep_that_was_deleted_is_told_and_there_again_after_the_same_command
     for command in (("plot", finished), sweep):
         assert "is damaged, or was edited by hand: 1 sweep; run: " in refused(*command, status=1)
     assert main(["repair", str(finished)]) == 0
-    said = capsys.readouterr().out
-    assert "lost: 1 sweep\na sweep that is lost is there again after the same sweep command" in said
+    assert "lost: 1 sweep\na sweep that is lost is there again after the same sweep command" in capsys.readouterr().out
     again = answered(*sweep)
     assert (again["curves"], again["episodes"]["run"]) == (whole, 0)
 

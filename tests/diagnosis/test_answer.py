@@ -28,8 +28,7 @@ def drives():
 def error(drives, *, model=TRUTH, dropped=(), learnt=None, horizon_s=2.0):
     declared, extended = (evaluate(drives, theta, DECLARED, NOISE) for theta in (TRUTH, model))
     findings = Findings(declared, extended, (), (), (), (), tuple(dropped))
-    kept = KeptAside(drives, drives, pose_noise(drives, model))
-    return horizon_error(findings, kept, horizon_s, learnt or {})
+    return horizon_error(findings, KeptAside(drives, drives, pose_noise(drives, model)), horizon_s, learnt or {})
 
 
 def test_before_is_the_declared_model_and_the_floor_lies_between_noise_and_what_was_reached(drives):

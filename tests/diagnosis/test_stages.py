@@ -15,6 +15,7 @@ import pytest
 from pictured import ROBOT, lane_poses, write_still_frames
 from PIL import Image
 from planted import CALM, TRUTH, look_for_few, planted_log
+from threadpoolctl import threadpool_info, threadpool_limits
 
 from proxytune.diagnosis import RULES, diagnose_log, forget_stages, robot_of
 from proxytune.diagnosis.answer import Estimate
@@ -264,6 +265,19 @@ def test_stages_of_motion_are_the_same_wherever_the_pictures_of_a_log_lie(tmp_pa
         with pytest.raises(Killed):
             diagnose_log(replace(log, frames=Frames((tmp_path / home,), *taken)), robot_of(log), folder=tmp_path)
     assert len(folders) == 1
+
+
+def test_a_diagnosis_runs_on_one_thread_of_motion_as_of_a_camera(tmp_path, monkeypatch):
+    def count(self, stage, make):
+        threads.update(pool["num_threads"] for pool in threadpool_info())
+        raise Killed
+
+    monkeypatch.setattr(Stages, "keep", count)
+    for log in (planted_log(TRUTH), read_log(still_frames(tmp_path / "log"))):
+        threads = set()
+        with threadpool_limits(limits=2), pytest.raises(Killed):
+            diagnose_log(log, ROBOT)
+        assert threads == {1}
 
 
 def test_a_damaged_stage_of_a_camera_is_told_in_one_line_and_made_again(tmp_path, monkeypatch):

@@ -123,8 +123,7 @@ def test_pictures_are_looked_at_once_and_without_markings_there_is_no_lane_and_w
     np.testing.assert_array_equal(act_together(agents, seen, memories)[0], once)
     look = Markings(open_eye(ROBOT), 60.0, 150.0)
     assert find_lanes(Seen(parted(np.zeros_like(seen_from())[None])), (look,), (0,)) == [None]
-    wary = Wary(Fixed(0.5, 0.5), contrast=254.0, crisp=5.0, slowest=0.3)
-    np.testing.assert_allclose(commands(wary, 3)[:, 0], 0.15)
+    np.testing.assert_allclose(commands(Wary(Fixed(0.5, 0.5), contrast=254.0, crisp=5.0, slowest=0.3), 3)[:, 0], 0.15)
     assert commands(Wary(Fixed(0.5, 0.5), contrast=30.0, crisp=5.0, slowest=0.3), 60)[-1, 0] > 0.49
 
 

@@ -136,8 +136,7 @@ def test_a_map_too_tight_for_the_car_and_an_effect_of_another_drive_are_refused_
 @pytest.mark.slow
 @pytest.mark.parametrize("agent", ["steady", "wary"])
 def test_our_agents_keep_a_car_in_its_lane_and_repeat_themselves(tmp_path, agent):
-    domain = family(tmp_path)
-    one, again = (domain.record(make_episode({}, agent=agent, start=1, seed=3)) for _ in range(2))
+    one, again = (family(tmp_path).record(make_episode({}, agent=agent, start=1, seed=3)) for _ in range(2))
     assert one.metrics["time_out_of_lane"] == 0.0
     assert one.metrics["survival_time"] == pytest.approx(10.0)
     assert one.metrics["distance"] > 3.0

@@ -133,8 +133,7 @@ def test_every_effect_of_the_catalogue_moves_an_agents_trajectory_as_it_is_measu
 @pytest.mark.parametrize("plant", ["bullet", "planar"])
 def test_a_marker_moves_the_measured_poses_and_not_the_true_ones(tmp_path, plant):
     domain = family(tmp_path, plant=plant, seconds=1.0)
-    theta = {"marker_offset.forward": 0.1, "heading_offset": 10.0}
-    episode = make_episode(theta, agent="brisk", start=1, seed=5)
+    episode = make_episode({"marker_offset.forward": 0.1, "heading_offset": 10.0}, agent="brisk", start=1, seed=5)
     driven = domain.drive(episode)
     shift = domain.measured(episode, driven) - driven.poses
     np.testing.assert_array_equal(driven.poses, poses(domain))
@@ -357,8 +356,7 @@ def test_a_robot_on_its_back_has_crashed():
 
 
 def test_planar_integration_is_exact_on_a_circle():
-    twists = np.tile((0.5, 0.0, 1.25), (2, 240, 1))
-    poses = integrate(np.zeros((2, 3)), twists, TICK_S)
+    poses = integrate(np.zeros((2, 3)), np.tile((0.5, 0.0, 1.25), (2, 240, 1)), TICK_S)
     angle = 1.25 * np.arange(1, 241) * TICK_S
     np.testing.assert_allclose(poses[0, :, 0], 0.4 * np.sin(angle), atol=1e-12)
     np.testing.assert_allclose(poses[1, :, 1], 0.4 * (1 - np.cos(angle)), atol=1e-12)

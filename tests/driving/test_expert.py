@@ -70,8 +70,7 @@ def shown(driver, poses=STEPS):
 
 def pushes(seed, steps=80, disturbance=DISTURBANCE):
     """What is added to the right wheel and taken off the left one."""
-    standing = np.tile(STEPS[:1], (steps, 1))
-    driven, memory = shown(expert(seed, disturbance=disturbance), standing)
+    driven, memory = shown(expert(seed, disturbance=disturbance), np.tile(STEPS[:1], (steps, 1)))
     return driven - np.array(memory.commands)
 
 

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from proxytune.arrays import one_thread
 from proxytune.diagnosis.answer import Estimate, Progress, verdict
 from proxytune.diagnosis.camera import error, selection
 from proxytune.diagnosis.camera.appearance import Appearance, changes, look_at
@@ -158,6 +159,7 @@ def declared_camera_effects(robot: Robot) -> tuple[str, ...]:
     return tuple(name for name in robot.catalogue.declared if name in camera_effects(robot.catalogue))
 
 
+@one_thread()
 def diagnose_camera(
     log: Log,
     robot: Robot,

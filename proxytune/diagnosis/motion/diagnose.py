@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from proxytune.arrays import one_thread
 from proxytune.diagnosis.answer import RULES, Estimate, Progress, Rules, verdict
 from proxytune.diagnosis.motion import effect_size, multistep_fit, prediction
 from proxytune.diagnosis.motion.clocks import Clocks, Parts, cut_into_blocks, on_one_clock, split
@@ -230,6 +231,7 @@ class Diagnosis:
         return self.found.model.noise
 
 
+@one_thread()
 def diagnose(
     log: Log,
     robot: Robot,

@@ -23,7 +23,7 @@ from proxytune.diagnosis.motion.curve_selection import MODEL, ChosenGroups, Sums
 from proxytune.diagnosis.motion.drives import Drives, Floats
 from proxytune.diagnosis.motion.evidence import Findings
 from proxytune.diagnosis.motion.innovations import Coordinate, smooth_coordinates, spans, theta_at
-from proxytune.diagnosis.motion.multistep_fit import HORIZONS_S
+from proxytune.diagnosis.motion.multistep_fit import HORIZONS_S, noise_floor, pose_noise
 from proxytune.diagnosis.motion.prediction import (
     FITTED_S,
     Ratio,
@@ -129,7 +129,7 @@ def fit_discrepancy(
     windows = cut(drives, FITTED_S)
     blocks = len(np.unique(drives.block[windows.begin]))
     before = pose_errors(drives, theta, windows)[:, 0] ** 2 if blocks else np.empty(0)
-    if blocks < drives.rules.discrepancy_blocks:
+    if blocks < drives.rules.discrepancy_blocks or not _has_room(drives, theta):
         return Discrepancy(held_out=before)
     offer, moving = offer_curves(drives, theta), smooth_coordinates(free, drives.robot)
     task = _Task(drives, theta, offer, moving, windows, before, rival, *_linearise(drives, theta, offer, moving))
@@ -151,6 +151,17 @@ def fit_discrepancy(
         ):
             found = alone
     return found
+
+
+def _has_room(drives: Drives, theta: Theta) -> bool:
+    """Tell whether there is more error than the noise of measured poses, which is left in any case."""
+    noise = pose_noise(drives, theta)
+    return any(
+        noise_floor(drives, windows, noise)[0]
+        < drives.rules.discrepancy_helps * float(np.sqrt(np.mean(pose_errors(drives, theta, windows)[:, 0] ** 2)))
+        for windows in (cut(drives, horizon_s) for horizon_s in HORIZONS_S)
+        if len(windows.begin)
+    )
 
 
 def _has(found: Discrepancy, groups: Iterable[str]) -> bool:
@@ -408,7 +419,11 @@ def _error(names: Theta, model: Theta, drives: Drives, horizon_s: float) -> Lear
 
 def _beside_declared(found: Findings, beside: Discrepancy) -> Discrepancy | None:
     """Curves beside what is declared alone, if there are names and these predict clearly better without them."""
+    drives, names = found.model.drives, found.model.theta
     if not found.adopted or not len(beside.held_out):
         return None
-    alone = fit_discrepancy(found.model.drives, found.declared.theta, found.declared.free, beside.held_out)
+    least, _ = noise_floor(drives, cut(drives, FITTED_S), pose_noise(drives, names))
+    if least >= drives.rules.doubtful_names * float(np.sqrt(beside.held_out.mean())):
+        return None
+    alone = fit_discrepancy(drives, found.declared.theta, found.declared.free, beside.held_out)
     return alone if alone.used else None

@@ -87,8 +87,7 @@ def edges(still=False):
     """Points on both edges of the bars; the picture brightens towards the bar's middle."""
     frame = np.repeat(np.arange(COUNT), 20)
     side = np.tile([0, 1], COUNT * 10)
-    row = np.tile(np.arange(20) * 2.0 + 10.5, COUNT)
-    place = np.stack((np.where(side, 55.0, 25.0), row), axis=-1)
+    place = np.stack((np.where(side, 55.0, 25.0), np.tile(np.arange(20) * 2.0 + 10.5, COUNT)), axis=-1)
     normal = np.stack((np.where(side, -1.0, 1.0), np.zeros(len(frame))), axis=-1)
     speed = np.zeros(len(frame)) if still else SPEEDS[frame] * normal[:, 0]
     return MovingEdges(frame, place, normal, speed)

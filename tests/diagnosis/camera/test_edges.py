@@ -102,8 +102,7 @@ def test_yellow_edges_are_told_by_their_colour_on_either_side():
 
 @pytest.mark.parametrize("colour", [0, 20, 128, 255, SKY], ids=str)
 def test_nothing_is_found_in_a_flat_picture_nor_in_one_of_nothing_but_sky(colour):
-    edges = find_edges(np.full((2, ROWS, COLUMNS, 3), colour, dtype=np.uint8))
-    assert [len(field) for field in edges] == [0] * 5
+    assert [len(field) for field in find_edges(np.full((2, ROWS, COLUMNS, 3), colour, dtype=np.uint8))] == [0] * 5
 
 
 def test_noise_sky_and_border_have_no_edges_and_points_are_sorted_by_picture_whatever_brightness():
@@ -237,8 +236,7 @@ def test_neutral_values_are_the_nominal_camera_in_the_log_s_size():
 def test_every_parameter_of_the_mounting_changes_the_camera(name, share):
     parameter = PARAMETERS[name]
     value = parameter.low + share * (parameter.high - parameter.low)
-    changed = OPTICS.figures({**NEUTRAL, name: value})
-    assert (changed == OPTICS.figures(NEUTRAL)) == (value == OPTICS.neutral(name))
+    assert (OPTICS.figures({**NEUTRAL, name: value}) == OPTICS.figures(NEUTRAL)) == (value == OPTICS.neutral(name))
 
 
 @given(st.floats(0.0, 0.5), st.floats(0.0, 0.2))

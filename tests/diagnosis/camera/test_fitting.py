@@ -52,8 +52,7 @@ def test_three_figures_together_come_back_from_far_away():
 def test_all_figures_free_lie_within_three_deviations_of_the_truth():
     truth = {"camera_roll": 4.0, "lens_distortion": -0.15}
     fit = everything(truth)
-    off = np.array([fit.theta[name] - {**NEUTRAL, **truth}[name] for name in fit.names])
-    assert (np.abs(off) < 3.0 * fit.sd).all()
+    assert (np.abs(np.array([fit.theta[name] - {**NEUTRAL, **truth}[name] for name in fit.names])) < 3.0 * fit.sd).all()
     assert abs(fit.theta["camera_roll"] - 4.0) < 0.5
     assert abs(fit.theta["lens_distortion"] + 0.15) < 0.03
 

@@ -198,8 +198,7 @@ def test_a_drive_s_residuals_vanish_at_its_latency_and_edges_of_other_polarity_d
     assert medians[1] > 3.0 * medians[0]
     assert medians[2] > 1.05 * medians[0]
     views = stood(count=6, noisy=False)
-    sky = views.edges._replace(row=np.full_like(views.edges.row, 5.0))
-    there = project(replace(views, edges=sky), at_truth(views))
+    there = project(replace(views, edges=views.edges._replace(row=np.full_like(views.edges.row, 5.0))), at_truth(views))
     assert not there.near.any()
     assert np.isfinite(there.residual).all()
     assert np.isfinite(there.slope).all()

@@ -92,8 +92,7 @@ def test_drives_are_not_fitted_nothing_removable_is_left_and_a_value_at_its_rang
     assert diagnosis.found.model.drives is diagnosis.parts.fitted
     jitter = AdoptedEffect("delay_jitter", "", ("delay_jitter",), (), 50.0, 0.01, ())
     highest = Estimate(PARAMETERS["delay_jitter"].high, (0.2, 0.3), "s")
-    there = replace(diagnosis, theta={**diagnosis.theta, "delay_jitter": highest})
-    assert there.at_edge(jitter) == ("delay_jitter",)
+    assert replace(diagnosis, theta={**diagnosis.theta, "delay_jitter": highest}).at_edge(jitter) == ("delay_jitter",)
     inside = replace(diagnosis, theta={**diagnosis.theta, "delay_jitter": replace(highest, value=0.1)})
     assert inside.at_edge(jitter) == ()
 
@@ -162,8 +161,7 @@ def test_an_hour_of_standing_with_a_minute_of_driving_gives_what_the_minute_give
 
 @pytest.mark.slow
 def test_poses_a_quarter_second_early_are_told_and_no_effect_is_invented():
-    log = hidden.make_log(hidden.CLEAN[1], episodes=6, seconds=20.0, late_s=-0.25)
-    found = diagnose(log, ROBOT, ("trim", "delay"))
+    found = diagnose(hidden.make_log(hidden.CLEAN[1], episodes=6, seconds=20.0, late_s=-0.25), ROBOT, ("trim", "delay"))
     assert found.clocks[0].offset.value == pytest.approx(hidden.CLEAN[1].delay - 0.25 - 0.15, abs=0.03)
     assert found.effects == ()
     assert found.theta["delay"].value == pytest.approx(0.15, abs=0.03)
@@ -179,8 +177,7 @@ def test_poses_a_quarter_second_early_are_told_and_no_effect_is_invented():
     ],
 )
 def test_what_no_usual_robot_has_is_found_with_its_value_and_of_what_contains_another_the_plainer(asked):
-    heavy = planted_log({**TRUTH, **asked}, episodes=6, seconds=20.0, noise=CALM)
-    found = diagnose(heavy, ROBOT, ("trim", "delay"))
+    found = diagnose(planted_log({**TRUTH, **asked}, episodes=6, seconds=20.0, noise=CALM), ROBOT, ("trim", "delay"))
     assert [(one.effect, one.rivals) for one in found.effects] == [(next(iter(asked)).split(".")[0], ())]
     assert {name: found.theta[name].value for name in asked} == pytest.approx(asked, rel=0.15)
     assert found.edges == ()

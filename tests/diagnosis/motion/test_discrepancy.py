@@ -106,6 +106,18 @@ def test_nothing_is_used_where_nothing_is_missing(seed):
     assert not fit_discrepancy(planted_drives(TRUTH, episodes=6, seconds=12.0, seed=seed), TRUTH).used
 
 
+def test_nothing_is_looked_for_where_only_the_noise_of_poses_is_left_nor_beside_names_that_leave_no_more(monkeypatch):
+    monkeypatch.setattr(discrepancy, "offer_curves", None)  # to be asked for curves would be an error
+    names, noise = {"saturation.limit": 0.25}, np.random.default_rng(1)
+    log = planted_log({**TRUTH, **names}, episodes=6, seconds=12.0, noise=None)
+    drives = drives_of(with_poses(log, lambda poses: poses + noise.normal(0.0, 0.003, poses.shape)))
+    learning = discrepancy.learn(findings(drives, names, (WRONG,)), drives, (2.0,))
+    assert (learning.discrepancy.used, learning.names_doubtful) == (False, False)
+    assert len(learning.discrepancy.held_out)
+    with pytest.raises(TypeError):
+        fit_discrepancy(drives, TRUTH)
+
+
 @pytest.mark.slow
 def test_slow_wheels_are_learnt_alone_and_else_what_matters_in_few_drives_is_looked_for():
     drives = planted_drives({**TRUTH, "wheel_gain.left": 0.9, "wheel_gain.right": 0.9}, episodes=6, seconds=12.0)

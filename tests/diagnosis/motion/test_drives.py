@@ -34,8 +34,7 @@ def test_right_angles_are_exact_ticks_at_least_60_per_second_and_sums_and_runs_b
     assert (drives.tick_hz, drives.rate_hz) == (60.0, 20.0)
     slow = replace(log(episode([0.0, 0.1, 0.2])), rate_hz=7.0)
     assert gather(slow, ROBOT, slow.episodes).tick_hz == 63.0
-    weights = np.array([2.0, 1.0, 5.0, -1.0])
-    sums = sum_by(np.array([0, 2, -1, 2]), np.arange(8.0).reshape(4, 2), 3, weights)
+    sums = sum_by(np.array([0, 2, -1, 2]), np.arange(8.0).reshape(4, 2), 3, np.array([2.0, 1.0, 5.0, -1.0]))
     np.testing.assert_array_equal(sums, [[0, 2], [0, 0], [-4, -4]])
     assert number_of(np.array([4, 4, 1, 7, 7])).tolist() == [0, 0, 1, 2, 2]
 
@@ -149,8 +148,7 @@ def test_wheel_speeds_are_used_where_all_episodes_have_them_without_a_gap():
     np.testing.assert_allclose(drives.rest, [[3.0 * SPEED_PER_RAD, 4.0 * SPEED_PER_RAD]])
     np.testing.assert_allclose(drives.wheels[0, 3:, 1], 6.0 * SPEED_PER_RAD)
 
-    steady = gathered(episode(0.01 * np.arange(40)))
-    np.testing.assert_allclose(steady.rest[0], 0.2 / ROBOT.figures["full_speed"])
+    np.testing.assert_allclose(gathered(episode(0.01 * np.arange(40))).rest[0], 0.2 / ROBOT.figures["full_speed"])
     np.testing.assert_array_equal(gathered(episode(0.004 * np.arange(40) ** 2 / 40)).rest[0], 0.0)
 
 

@@ -180,8 +180,7 @@ def test_repeats_show_what_a_model_lacks_as_far_as_drives_go_and_are_repeated():
     assert 0.3 < compare_repeats(repeated_drives(driven_log(TRUTH, duties, starts)), TRUTH, 1.0).part < 0.9
     duties, starts = make_drives(3, 2, 600)
     log = driven_log(TRUTH, duties, starts)
-    twice = repeated_drives(replace(log, episodes=(*log.episodes, *log.episodes)))
-    assert compare_repeats(twice, TRUTH, 1.0) is None
+    assert compare_repeats(repeated_drives(replace(log, episodes=(*log.episodes, *log.episodes))), TRUTH, 1.0) is None
     duties, starts = make_drives(4, 6, 400)
     duties[:, :200] = 0.0
     assert compare_repeats(repeated_drives(driven_log(TRUTH, duties[:5], starts[:5])), TRUTH, 2.0) is None

@@ -169,8 +169,7 @@ def test_only_an_end_that_is_not_neutral_is_an_edge(drives):
     assert at_edge("motor_lag.time_constant", 1.0, drives)
     assert not at_edge("dead_band.width", 0.0, drives)
     assert not at_edge("motor_lag.time_constant", 0.5, drives)
-    wider = replace(drives, ranges={"motor_lag.time_constant": (0.0, 2.0)})
-    assert not at_edge("motor_lag.time_constant", 1.0, wider)
+    assert not at_edge("motor_lag.time_constant", 1.0, replace(drives, ranges={"motor_lag.time_constant": (0.0, 2.0)}))
 
 
 @pytest.mark.parametrize(

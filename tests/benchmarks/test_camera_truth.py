@@ -89,8 +89,7 @@ def pictures(sight, poses, middles=None):
 )
 def test_rays_are_those_of_the_figures_definitions(**figures_):
     sight = Sight(**figures_)
-    up = lens_rays(figures(sight), *PLACES)
-    assert np.allclose(rays(sight, *PLACES), up * (1.0, 1.0, -1.0), atol=1e-9)
+    assert np.allclose(rays(sight, *PLACES), lens_rays(figures(sight), *PLACES) * (1.0, 1.0, -1.0), atol=1e-9)
 
 
 @pytest.mark.slow

@@ -84,8 +84,7 @@ def test_markings_overlap_the_independent_renderers(colour, bound):
 )
 def test_the_overlap_tells_a_camera_that_is_mounted_otherwise(name, step):
     """It falls from 0.68 to 0.63 or less on either side of the nominal camera."""
-    mounted = getattr(CAMERA, name)
-    best = max(overlap(ours(**{name: mounted + way * step}), "both") for way in (-1, 1))
+    best = max(overlap(ours(**{name: getattr(CAMERA, name) + way * step}), "both") for way in (-1, 1))
     assert best < overlap(nominal(), "both") - 0.02
 
 

@@ -279,20 +279,26 @@ def _is_everywhere(one: FittedCandidate) -> bool:
 
 
 def _is_plain_form_of(one: FittedCandidate, best: FittedCandidate) -> bool:
-    """Tell whether it is the best effect's form for both wheels, or a special case, at little loss of evidence."""
+    """Tell whether it is the best effect's form for both wheels, or a special case, at little loss of evidence.
+
+    A special case may lose more of it where the best effect does not predict surely better.
+    """
     if one.screened is None or best.screened is None or one is best or one.screened.candidate.form:
         return False
     name, effect = best.screened.candidate.effect, one.screened.candidate.effect
-    special = name == effect or effect in _contained(best.fitted.drives, name)
-    return special and one.gain > one.fitted.drives.rules.plain_share * best.gain
+    rules, share = one.fitted.drives.rules, one.gain / best.gain
+    if effect != name and effect not in _contained(best.fitted.drives, name):
+        return False
+    if effect == name or share > rules.plain_share:
+        return share > rules.plain_share
+    return share >= rules.rival_share and not _predicts_better(best.fitted, one.fitted)
 
 
 def _predicts_well_enough(one: FittedCandidate, model: Fit) -> bool:
     """Tell whether an effect predicts no worse than the model, and better where it contains an effect of the model."""
     contained = _contained(model.drives, one.screened.candidate.effect) if one.screened else ()
     if contained and any(effect_of(name) in contained for name in model.theta):
-        compared = _compare_predictions(one.fitted, model)
-        return compared is None or compared.below
+        return _predicts_better(one.fitted, model)
     return predicts_no_worse(one.fitted, model)
 
 
@@ -326,6 +332,12 @@ def predicts_no_worse(one: Fit, other: Fit) -> bool:
     """Tell whether one model's error over windows is not shown to exceed the other's beyond the guard's factor."""
     compared = _compare_predictions(one, other)
     return compared is None or compared.interval[0] <= other.drives.rules.guard_factor
+
+
+def _predicts_better(one: Fit, other: Fit) -> bool:
+    """Tell whether one model's error over windows is surely less than the other's, where there are windows."""
+    compared = _compare_predictions(one, other)
+    return compared is None or compared.below
 
 
 def _compare_predictions(one: Fit, other: Fit) -> Ratio | None:

@@ -151,9 +151,11 @@ def test_a_form_for_both_wheels_is_preferred_to_one_for_a_single_wheel_at_little
     assert chosen(drives, one, both) == wanted
 
 
-def test_one_that_contains_another_gives_way_to_it_at_little_loss_and_beside_it_has_to_predict_better(drives):
+def test_one_that_contains_another_gives_way_to_it_at_little_loss_and_else_has_to_predict_better(drives):
     heavy = (RESISTED, {f"inertia.{name}": 0.001 for name in ("forward", "turn", "linear")}, 90.0)
-    assert [chosen(drives, heavy, ("yaw_lag", {"yaw_lag": 0.001}, gain)) for gain in (85, 40)] == ["yaw_lag", RESISTED]
+    lags = [chosen(drives, heavy, ("yaw_lag", {"yaw_lag": 0.001}, gain)) for gain in (85, 65, 40)]
+    assert lags == ["yaw_lag", "yaw_lag", RESISTED]
+    assert chosen(drives, heavy, ("yaw_lag", {"yaw_lag": 0.3}, 65)) == RESISTED
     assert chosen(drives, heavy, had={**TRUTH, "yaw_lag": 0.001}) is None
     assert chosen(drives, (RESISTED, {**heavy[1], "yaw_lag": 0.0}, 90.0), had={**TRUTH, "yaw_lag": 0.3}) == RESISTED
 

@@ -77,6 +77,45 @@ def _pass(signal, thresholds, before, on, passed):  # type: ignore[no-untyped-de
                 before[row, channel] = new
 
 
+def play(signal: NDArray[Any], before: NDArray[Any], halves: NDArray[Any], out: NDArray[Any]) -> NDArray[Any]:
+    """Drag values along (…, time, widths) by a signal (…, time), through plays of half widths, from those before."""
+    now = np.array(np.broadcast_to(before, (*signal.shape[:-1], len(halves))), dtype=float, order="C")
+    rows = signal.reshape(-1, signal.shape[-1])
+    _drag(rows, now.reshape(len(rows), -1), halves, out.reshape(*rows.shape, -1))
+    return out
+
+
+def _pull(signal, now, halves, out):  # type: ignore[no-untyped-def]
+    for row in range(signal.shape[0]):
+        for sample in range(signal.shape[1]):
+            here = signal[row, sample]
+            for width in range(len(halves)):
+                low, high = here - halves[width], here + halves[width]
+                now[row, width] = min(max(now[row, width], low), high)
+                out[row, sample, width] = now[row, width]
+
+
+def ramp(
+    signal: NDArray[Any], before: NDArray[Any], grows: NDArray[Any], shrinks: NDArray[Any], out: NDArray[Any]
+) -> NDArray[Any]:
+    """Follow a signal (…, time) by at most so much a sample (…, time, limits), from values before."""
+    now = np.array(np.broadcast_to(before, (*signal.shape[:-1], len(grows))), dtype=float, order="C")
+    rows, limits = signal.reshape(-1, signal.shape[-1]), np.array([grows, shrinks], dtype=float)
+    _climb(rows, now.reshape(len(rows), -1), limits, out.reshape(*rows.shape, -1))
+    return out
+
+
+def _step(signal, now, limits, out):  # type: ignore[no-untyped-def]
+    for row in range(signal.shape[0]):
+        for sample in range(signal.shape[1]):
+            here = signal[row, sample]
+            for limit in range(limits.shape[1]):
+                was = now[row, limit]
+                most = limits[0, limit] if abs(here) > abs(was) else limits[1, limit]
+                now[row, limit] = was + min(max(here - was, -most), most)
+                out[row, sample, limit] = now[row, limit]
+
+
 # Signatures are compiled on import, which finds out whether Numba works here. No fast mathematics: it changes bits
 _compiled: dict[str, Any] = {"nopython": True, "nogil": True, "cache": True, "error_model": "numpy"}
 _ROWS, _LAST = "float64[:,:,:]", "float64[:,::1]"
@@ -84,3 +123,5 @@ _follow = numba.jit(f"void({_ROWS}, float64, float64, {_LAST}, float64[:,:,::1])
 _TABLE = "float64[:,:]"
 _near = numba.jit(f"void({_TABLE}, {_TABLE}, float64[::1], float64[:,::1])", **_compiled)(_come_near)
 _switch = numba.jit(f"void({_ROWS}, {_LAST}, {_LAST}, boolean[:,::1], float64[:,:,::1])", **_compiled)(_pass)
+_drag = numba.jit(f"void({_TABLE}, {_LAST}, float64[::1], float64[:,:,::1])", **_compiled)(_pull)
+_climb = numba.jit(f"void({_TABLE}, {_LAST}, {_LAST}, float64[:,:,::1])", **_compiled)(_step)

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from proxytune.effects.effect import Signal, lfilter
+from proxytune.effects.effect import Signal, fastest, lfilter
 from proxytune.effects.motion import REST_SPEED
 
 Knot = float | tuple[float, float]
@@ -75,7 +75,9 @@ def floor_map(asked: AskedMotion, knots: Knots, axes: slice = slice(None)) -> Si
     gaps = np.diff(np.sort(places, axis=0), axis=0)
     mesh = float(gaps[gaps > 0.0].min(initial=WIDEST_MESH_M))
     pairs = zip(np.moveaxis(asked.place[..., axes], -1, 0), places.T, strict=True)
-    parts = (np.maximum(0.0, 1.0 - np.abs(here[..., None] - at) / mesh) for here, at in pairs)
+    # Many knots have an x or y in common.
+    lines = ((here, *np.unique(at, return_inverse=True)) for here, at in pairs)
+    parts = (np.maximum(0.0, 1.0 - np.abs(here[..., None] - at) / mesh)[..., own] for here, at, own in lines)
     return np.asarray(functools.reduce(np.multiply, parts))
 
 
@@ -367,7 +369,9 @@ def rings(change: Signal, before: Signal, frequencies_hz: Knots, rate_hz: float)
 def play(signal: Signal, before: Signal, halves: Knots) -> Signal:
     """Value dragged along by a signal (…, time) through plays of these half widths (…, time, widths)."""
     out, now = np.empty((*signal.shape, len(halves))), before
-    half = np.asarray(halves)
+    half = np.asarray(halves, dtype=float)
+    if out.size and (compiled := fastest(out.size)):
+        return compiled.play(signal, before, half, out)  # type: ignore[no-any-return]
     for step in range(signal.shape[-1] if len(halves) else 0):
         here = signal[..., step, None]
         now = np.minimum(np.maximum(now, here - half), here + half)
@@ -378,6 +382,8 @@ def play(signal: Signal, before: Signal, halves: Knots) -> Signal:
 def ramp(signal: Signal, before: Signal, grows: Signal, shrinks: Signal) -> Signal:
     """Value that follows a signal (…, time) by at most so much a sample, as that is larger or not (…, time, limits)."""
     out, now = np.empty((*signal.shape, len(grows))), before
+    if out.size and (compiled := fastest(out.size)):
+        return compiled.ramp(signal, before, grows, shrinks, out)  # type: ignore[no-any-return]
     for step in range(signal.shape[-1] if len(grows) else 0):
         here = signal[..., step, None]
         most = np.where(np.abs(here) > np.abs(now), grows, shrinks)

@@ -11,6 +11,7 @@ from hypothesis import given, settings, strategies as st
 
 from proxytune.effects import FilterContext, compiled, effect
 from proxytune.effects.effect import FEW, low_pass, low_pass_at, reckon, start_reckoning
+from proxytune.effects.features import play, ramp
 
 
 def test_beyond_what_is_known_the_rates_lead_on_in_chunks_as_in_one():
@@ -53,12 +54,14 @@ def test_many_samples_follow_to_the_last_bit_as_compiled(length, channels, batch
     signal = random.standard_normal((*batch, length, channels + 1))[..., 1:]
     signal[..., : length // 2, :] = 0.0
     state, ways = low_pass_at(random.standard_normal((*batch, channels)), lasts), []
+    widths = np.linspace(0.0, 0.5, channels)
     for used in (-np.inf, effect.PAYS_OFF):
         with pytest.MonkeyPatch.context() as patched:
             patched.setattr(effect, "_filtered", [used])
             mean, end = low_pass(signal, state)
-            starts, last = effect.approach(signal[..., 0], np.exp(-(signal[..., 0] ** 2)), state.value[..., 0])
-        ways.append((starts.tobytes(), last.tobytes(), mean.tobytes(), end.value.tobytes(), end.value.shape, end[1:]))
+            first = effect.approach(signal[..., 0], np.exp(-(signal[..., 0] ** 2)), state.value[..., 0])
+            dragged = play(signal[..., 0], state.value, widths), ramp(signal[..., 0], state.value, widths, 0.5 - widths)
+        ways.append(([one.tobytes() for one in (*first, *dragged, mean, end.value)], end.value.shape, end[1:]))
     assert ways[0] == ways[1]
 
 

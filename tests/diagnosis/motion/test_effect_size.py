@@ -86,8 +86,7 @@ def adopted(effect, free=(), names=()):
 
 def found(drives, theta, *effects):
     free = DECLARED + tuple(coordinate for effect in effects for coordinate in effect.free)
-    declared = evaluate(drives, TRUTH, DECLARED, NOISE)
-    return Findings(declared, evaluate(drives, theta, free, NOISE), effects, (), (), ())
+    return Findings(evaluate(drives, TRUTH, DECLARED, NOISE), evaluate(drives, theta, free, NOISE), effects, (), (), ())
 
 
 @pytest.fixture(scope="module")

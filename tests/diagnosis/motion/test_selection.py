@@ -147,8 +147,7 @@ def test_a_random_effect_needs_as_small_a_chance_and_twice_the_evidence(drives, 
 @pytest.mark.parametrize(("gain", "wanted"), [(85.0, "dead_band"), (40.0, "dead_band (left wheel)")])
 def test_a_form_for_both_wheels_is_preferred_to_one_for_a_single_wheel_at_little_loss(drives, gain, wanted):
     one = ("dead_band (left wheel)", {"dead_band.width": 0.001, "dead_band.imbalance": 0.001}, 90.0)
-    both = ("dead_band", {"dead_band.width": 0.001, "dead_band.imbalance": 0.0}, gain)
-    assert chosen(drives, one, both) == wanted
+    assert chosen(drives, one, ("dead_band", {"dead_band.width": 0.001, "dead_band.imbalance": 0.0}, gain)) == wanted
 
 
 def test_one_that_contains_another_gives_way_to_it_at_little_loss_and_else_has_to_predict_better(drives):

@@ -165,7 +165,7 @@ OTHER_FORM: tuple[Case, ...] = tuple(
             ("slip_angle", {"slip": 0.15, "most": 0.15}, ("lateral_slip",)),
             ("hilly_floor", {"x": 0.025, "y": -0.02}, ("floor_slope",)),
             ("oil_that_thins_out", {"loss": 0.6, "x": 0.2, "y": 0.2, "radius": 0.9}, ("slippery_patch",)),
-            ("smoothed_poses", {"tau": 0.15}, ("motor_lag",)),
+            ("smoothed_poses", {"tau": 0.15}, ("motor_lag", "inertia")),
         )
     )
 )

@@ -58,6 +58,7 @@ def test_what_was_found_or_declared_is_told_with_name_meaning_size_and_worth_and
     assert findings([{"name": "dead_band"}, {"name": "trim"}]) == "dead band and trim"
 
     own = {"name": "gone:Wheel", "parameters": {"shrink": {"value": 0.25, "interval": [0.25, 0.25], "unit": "m"}}}
+    own["parameters"]["grow"] = {"value": 0.0, "interval": [0.0, 0.0], "unit": "1/s"}
     assert finding(own) == "gone:Wheel: shrink 0.25 m"
     # A declared trim that was found stands in the first sentence; what is in no θ and equal wheels are not told.
     trim, delay = Estimate(0.0433, (0.0421, 0.0446), ""), Estimate(0.12, (0.1, 0.14), "s")

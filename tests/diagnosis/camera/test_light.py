@@ -52,8 +52,7 @@ def test_a_bumper_leaves_no_contrast_where_markings_pass():
 @pytest.mark.slow
 def test_the_largest_blemish_comes_first_and_a_clean_camera_has_none_whatever_light_or_lamps():
     model, seen = scene()
-    spots = dirty(dirty(seen, 75, 40, diameter=12.0), 95, 110, diameter=26.0)
-    first, second = blemishes(logged(spots), model)
+    first, second = blemishes(logged(dirty(dirty(seen, 75, 40, diameter=12.0), 95, 110, diameter=26.0)), model)
     assert first.share > second.share
     assert first.columns[0] > 80 > second.columns[1]
     assert blemishes(logged(seen, 0.8, 1.3, 0.3, drift=0.1, noise=3.0), model) == ()

@@ -159,7 +159,7 @@ OTHER_FORM: tuple[Case, ...] = tuple(
             ("rubber_backlash", {"gap": 0.8}, ("backlash",)),
             ("triangular_ripple", {"size": 0.3}, ("wheel_ripple",)),
             ("scrub_when_slow", {"share": 0.35}, ("yaw_scrub",)),
-            ("understeer_with_square", {"gain": 2.5}, ("understeer",)),
+            ("understeer_with_square", {"gain": 2.5}, ("understeer", "inertia")),
             ("yaw_lag_of_second_order", {"tau": 0.25}, ("yaw_lag",)),
             ("turn_slip_with_root", {"loss": 0.12}, ("turn_slip",)),
             ("slip_angle", {"slip": 0.15, "most": 0.15}, ("lateral_slip",)),

@@ -55,14 +55,14 @@ def study(tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", MADE_FROM)
-def test_the_target_is_reproduced_byte_for_byte(study, name, capsys):
+def test_the_target_is_reproduced_but_for_last_digits_in_which_processors_differ(study, name, capsys):
     if name in NEEDS:
         pytest.importorskip(NEEDS[name])
     folder = study(name)
     model, made = folder / MADE_FROM[name], folder / "again.csv"
     assert main(["measure", str(folder), "--model", str(model), "--output", str(made)]) == 0
-    lines = (folder / "target.csv").read_bytes().splitlines(keepends=True)
-    assert made.read_bytes() == b"".join(line for line in lines if line.split(b",")[1] in b"episode 0 1".split())
+    again, target = pd.read_csv(made), pd.read_csv(folder / "target.csv")
+    pd.testing.assert_frame_equal(again, target[target["episode"] < 2].reset_index(drop=True), rtol=1e-6)
 
 
 @pytest.mark.slow

@@ -27,7 +27,7 @@ from importlib.abc import Loader
 from importlib.machinery import ModuleSpec, PathFinder, SourceFileLoader
 from pathlib import Path
 from types import FrameType, ModuleType
-from typing import Any
+from typing import Any, ClassVar
 
 from proxytune.errors import ExtensionError
 from proxytune.files import temporary_folder
@@ -36,6 +36,12 @@ from proxytune.identity import digest, modules_beside
 
 class Interrupted(KeyboardInterrupt):
     """The user has pressed Ctrl-C; raised in the main thread."""
+
+    latest: ClassVar[KeyboardInterrupt] = KeyboardInterrupt()
+
+    def __init__(self, *known: int) -> None:
+        super().__init__(*known)
+        Interrupted.latest = self
 
 
 def interrupt(number: int, frame: FrameType | None) -> None:

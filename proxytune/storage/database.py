@@ -25,6 +25,7 @@ from pathlib import Path
 from typing import Any
 
 from proxytune.errors import StoreError
+from proxytune.extensions import Interrupted
 from proxytune.storage.folder import refuse_links
 
 APPLICATION = 0x70747564  # "ptud"
@@ -188,6 +189,9 @@ def sqlite_errors_as_store_errors(path: Path) -> Iterator[None]:
     try:
         yield
     except sqlite3.Error as problem:
+        # `digest_of` fails at nothing: a signal came meanwhile, and SQLite does not tell which.
+        if "user-defined function" in str(problem):
+            raise Interrupted.latest from problem
         raise _explained(path, problem) from problem
     except UnicodeDecodeError as problem:
         raise _corrupt(path, "it has text that is no UTF-8") from problem

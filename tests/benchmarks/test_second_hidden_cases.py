@@ -120,8 +120,7 @@ def test_motor_lag_is_the_time_constant_of_its_wheels(tau, wheel, reached):
 
 def test_motors_overshoot_and_coast_and_a_driver_brakes_before_reversing_and_kicks_after_a_rest():
     forward = twists(held(1.0, 1.0), ("overshooting_motor", {"hz": 0.9, "damping": 0.25}))[:, 0]
-    share = np.exp(-np.pi * 0.25 / np.sqrt(1.0 - 0.25**2))
-    assert forward.max() == pytest.approx(0.6 * (1.0 + share), abs=1e-4)
+    assert forward.max() == pytest.approx(0.6 * (1.0 + np.exp(-np.pi * 0.25 / np.sqrt(1.0 - 0.25**2))), abs=1e-4)
     duties = held(1.0, 1.0, 8.0)
     duties[:, 80:] = 0.0
     forward = twists(duties, ("coasting", {"tau": 0.9}))[:, 0]
@@ -154,8 +153,7 @@ def test_messages_are_dropped_polled_and_averaged_as_said():
     assert np.mean(np.diff(dropped[0, :, 0]) == 0.0) == pytest.approx(0.3, abs=0.03)
     late = second.ARRIVED["polled_commands"](np.arange(4000)[None] * 0.05, _run(ramp), period=0.23)
     assert np.mean(late - np.arange(4000) * 0.05) == pytest.approx(0.115, abs=0.01)
-    mean = second.SENT["moving_average"](ramp, _run(ramp), rows=5)
-    np.testing.assert_allclose(mean[0, 4:, 0], ramp[0, 2:-2, 0])
+    np.testing.assert_allclose(second.SENT["moving_average"](ramp, _run(ramp), rows=5)[0, 4:, 0], ramp[0, 2:-2, 0])
 
 
 def _run(duties):

@@ -110,8 +110,7 @@ def test_import_leaves_nothing(tmp_path, interrupted, monkeypatch):
 
 def test_record_leaves_no_log_but_pictures(tmp_path, interrupted, ctrl_c, monkeypatch):
     monkeypatch.setattr("proxytune.diagnosis.recording.SHORTEST_S", 0.5)
-    study = (shipped("studies") / "quickstart" / "study.toml").read_text(encoding="utf-8")
-    (tmp_path / "study.toml").write_text(study)
+    (tmp_path / "study.toml").write_text((shipped("studies") / "quickstart" / "study.toml").read_text(encoding="utf-8"))
     (tmp_path / "model.toml").write_text(MODEL)
     ctrl_c(7)
     options = ("--repeats", "1", "--seconds", "5", "--frames", "4", "--output", tmp_path / "log")

@@ -48,8 +48,7 @@ def test_a_target_model_adds_pod_and_keeps_its_own_files(make_study, tmp_path, a
 
 @pytest.mark.slow
 def test_trials_and_sweeps_share_episodes_and_a_finished_study_is_swept_at_its_best_theta(finished, answered):
-    theta = answered("study", finished)["trials"][0]["theta"]
-    at = ",".join(f"{name}={value!r}" for name, value in theta.items())
+    at = ",".join(f"{name}={value!r}" for name, value in answered("study", finished)["trials"][0]["theta"].items())
     assert answered("sweep", finished, "--parameter", "trim", "--points", "2", "--at", at)["episodes"]["run"] == 2 * 18
     best = answered("study", finished)["best"]["theta"]
     document = answered(*["sweep", str(finished), "--parameter", "trim", "--points", "2"])

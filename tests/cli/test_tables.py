@@ -49,5 +49,4 @@ def test_tables_of_the_scores_of_one_proxy_and_of_several_and_of_a_diagnosis_are
         words = [word for proxy in proxies for word in ("--proxy", proxy)]
         assert_whole(shown("score", *words, "--target", f"{path}:the_target", *metrics))
     columns = columns_of(("effect",), ("held-out gain [nats]", "p", "value"))
-    row = (LONG, "1234.5678", "0.001", "−0.123 to 0.456")
-    assert_whole(table_text(Table("Candidates", columns, (row,))))
+    assert_whole(table_text(Table("Candidates", columns, ((LONG, "1234.5678", "0.001", "−0.123 to 0.456"),))))

@@ -11,6 +11,7 @@ from hypothesis import given, settings, strategies as some
 
 from proxytune.domain import Outcome, make_episode
 from proxytune.errors import StoreError
+from proxytune.extensions import Interrupted, interrupt
 from proxytune.storage import Store, SweepRecord, TrialRecord, database, salvage
 
 
@@ -454,3 +455,9 @@ def test_a_database_that_was_cut_off_anywhere_is_told(tmp_path):
             with pytest.raises(StoreError, match="is damaged|is not a study's database"):
                 opened(tmp_path, writable)
             assert path.stat().st_size == size, "a refused database must stay as it was"
+
+
+def test_a_signal_that_comes_while_sqlite_asks_for_a_digest_is_no_damage(tmp_path, monkeypatch):
+    monkeypatch.setattr(database, "digest_of", lambda *values: interrupt(2, None))
+    with pytest.raises(Interrupted), Store.open(tmp_path) as store:
+        store.save_fact("budget", 12)

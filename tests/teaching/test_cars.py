@@ -39,11 +39,11 @@ TWIN = 'format = 1\nrobot = "car"\n[effects.steering_offset]\noffset = 0.05\n'
 
 
 @pytest.mark.slow
-def test_a_car_learns_in_the_proxy_what_it_needs_on_the_target(tmp_path, answered):
+def test_a_car_learns_in_either_proxy_to_drive_on_the_target(tmp_path, answered):
     (tmp_path / "study.toml").write_text(STUDY, encoding="utf-8")
     (tmp_path / "target.csv").write_text(TARGET, encoding="utf-8")
     (tmp_path / "twin.toml").write_text(TWIN, encoding="utf-8")
     document = answered("teach", tmp_path)
     right, wrong = (document["proxies"][name] for name in ("right", "wrong"))
     assert right["theta"] == {"steering_offset": 0.05}
-    assert right["zero_shot"] > wrong["zero_shot"]
+    assert min(right["zero_shot"], wrong["zero_shot"]) > 2.8  # of 3 s; after 20 samples it is 1.5

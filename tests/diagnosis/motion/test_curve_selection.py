@@ -65,8 +65,7 @@ def test_nothing_is_chosen_of_noise_nor_any_rare_moment(seed):
 def test_the_group_that_gains_most_is_chosen_however_uneven_errors_are_and_few_wild_ones_hardly_count():
     scale = np.repeat([30.0, *np.ones(PARTS - 1)], 40)
     plain = slopes(WEIGHTS)
-    loud = Slopes(plain.residuals * scale[:, None], plain.columns * scale[:, None, None], plain.block)
-    given = summed(loud)
+    given = summed(Slopes(plain.residuals * scale[:, None], plain.columns * scale[:, None, None], plain.block))
     assert given.size.max() > 10.0 * given.size.sum() / PARTS * 0.5
     assert list(choose_groups(given, COLUMNS, RULES).gains) == ["other"]
     np.testing.assert_allclose(

@@ -31,7 +31,7 @@ def compiled_loops(module: str) -> ModuleType | None:
 def one_thread() -> Iterator[None]:
     """Have libraries use one thread meanwhile; also a decorator.
 
-    Threads that share small matrices wait for each other: on a busy machine a diagnosis took five times as long.
+    Threads that share small matrices wait for each other: beside another program a diagnosis took four times as long.
     """
     with _libraries(len(sys.modules)).limit(limits=1):
         yield

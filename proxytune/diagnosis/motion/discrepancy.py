@@ -23,7 +23,7 @@ from proxytune.diagnosis.motion.curve_selection import MODEL, ChosenGroups, Sums
 from proxytune.diagnosis.motion.drives import Drives, Floats
 from proxytune.diagnosis.motion.evidence import Findings
 from proxytune.diagnosis.motion.innovations import Coordinate, smooth_coordinates, spans, theta_at
-from proxytune.diagnosis.motion.multistep_fit import HORIZONS_S, noise_floor, pose_noise
+from proxytune.diagnosis.motion.multistep_fit import HORIZONS_S, PoseNoise, noise_floor, pose_noise
 from proxytune.diagnosis.motion.prediction import (
     FITTED_S,
     Ratio,
@@ -155,13 +155,14 @@ def fit_discrepancy(
 
 def _has_room(drives: Drives, theta: Theta) -> bool:
     """Tell whether there is more error than the noise of measured poses, which is left in any case."""
-    noise = pose_noise(drives, theta)
-    return any(
-        noise_floor(drives, windows, noise)[0]
-        < drives.rules.discrepancy_helps * float(np.sqrt(np.mean(pose_errors(drives, theta, windows)[:, 0] ** 2)))
-        for windows in (cut(drives, horizon_s) for horizon_s in HORIZONS_S)
-        if len(windows.begin)
-    )
+    noise, share = pose_noise(drives, theta), drives.rules.discrepancy_helps
+    known = [windows for horizon_s in HORIZONS_S if len((windows := cut(drives, horizon_s)).begin)]
+    return not all(_is_noise(drives, noise, one, pose_errors(drives, theta, one)[:, 0] ** 2, share) for one in known)
+
+
+def _is_noise(drives: Drives, noise: PoseNoise, windows: Windows, squares: Floats, share: float) -> bool:
+    """Tell whether the noise of poses makes at least this share of the error over windows, of squares (M,) [m²]."""
+    return noise_floor(drives, windows, noise)[0] >= share * float(np.sqrt(squares.mean()))
 
 
 def _has(found: Discrepancy, groups: Iterable[str]) -> bool:
@@ -422,8 +423,8 @@ def _beside_declared(found: Findings, beside: Discrepancy) -> Discrepancy | None
     drives, names = found.model.drives, found.model.theta
     if not found.adopted or not len(beside.held_out):
         return None
-    least, _ = noise_floor(drives, cut(drives, FITTED_S), pose_noise(drives, names))
-    if least >= drives.rules.doubtful_names * float(np.sqrt(beside.held_out.mean())):
+    noise, windows = pose_noise(drives, names), cut(drives, FITTED_S)
+    if _is_noise(drives, noise, windows, beside.held_out, drives.rules.doubtful_names):
         return None
     alone = fit_discrepancy(drives, found.declared.theta, found.declared.free, beside.held_out)
     return alone if alone.used else None

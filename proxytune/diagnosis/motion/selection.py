@@ -287,11 +287,10 @@ def _is_plain_form_of(one: FittedCandidate, best: FittedCandidate) -> bool:
         return False
     name, effect = best.screened.candidate.effect, one.screened.candidate.effect
     rules, share = one.fitted.drives.rules, one.gain / best.gain
-    if effect != name and effect not in _contained(best.fitted.drives, name):
-        return False
-    if effect == name or share > rules.plain_share:
-        return share > rules.plain_share
-    return share >= rules.rival_share and not _predicts_better(best.fitted, one.fitted)
+    special = effect in _contained(best.fitted.drives, name)
+    if share > rules.plain_share:
+        return special or name == effect
+    return special and share >= rules.rival_share and not _predicts_better(best.fitted, one.fitted)
 
 
 def _predicts_well_enough(one: FittedCandidate, model: Fit) -> bool:

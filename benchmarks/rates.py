@@ -1,6 +1,6 @@
 """How often a diagnosis is right: `python benchmarks/rates.py OUTPUT [--generator NAME] [--every N] [--kinds NAMES]`.
 
-Cases that OUTPUT has no line of yet are diagnosed, about half a minute of processor time each, and added to it one by
+Cases that OUTPUT has no line of yet are diagnosed, about 25 s of processor time each, and added to it one by
 one: a run that was stopped goes on where it was. At the end come the rates over everything in OUTPUT.
 """
 

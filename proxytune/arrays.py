@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 Whole = NDArray[np.int64]
 Flags = NDArray[np.bool_]
+NORMAL_95 = 1.96  # half of a 95 % interval in standard deviations
 
 
 def compiled_loops(module: str) -> ModuleType | None:

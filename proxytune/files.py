@@ -21,23 +21,24 @@ from pathlib import Path
 from string import Template
 from typing import Any
 
-from proxytune.errors import InputError, SettingsError
+from proxytune.errors import InputError, ProxytuneError, SettingsError
 
 
-def check_place(path: Path, *, folder: bool = False, ours: bool = False) -> None:
+def check_place(path: Path, *, folder: bool = False, ours: bool = False, inputs: Iterable[str | Path] = ()) -> None:
     """Refuse a file or folder that cannot be written, before the work begins that ends there.
-
-    That a disk gets full is not known beforehand.
 
     Args:
         path: The file or folder; it, and folders on the way, need not be there.
         folder: Whether it is a folder.
         ours: Whether its name is ours, in a folder that the user has given.
+        inputs: What the work reads.
 
     Raises:
-        InputError: If something else is there, or nothing may be written there.
+        InputError: If something else or an input is there, or nothing may be written there.
     """
     whole = path.absolute()
+    if path.exists() and any(Path(one).exists() and path.samefile(one) for one in inputs):
+        raise InputError(f"{path}: is read by this command, and would be lost; give another name")
     there = next(place for place in (whole, *whole.parents) if os.path.lexists(place))
     if there == whole and there.exists() and not (there.is_dir() if folder else there.is_file()):
         what = "a folder" if there.is_dir() else "a file" if there.is_file() else "a device or a pipe"
@@ -135,6 +136,16 @@ def _clear_away(folder: Path) -> None:
 TEMPORARY = "proxytune_"
 NEW_S = 60.0
 """So long after it was made [s] a temporary folder may not be locked yet."""
+
+
+def write_or_refuse(path: Path, text: str, kind: type[ProxytuneError]) -> None:
+    """Write a text whole, its folder made where missing, or leave the old file and raise an error of this kind."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with draft_of(path) as draft:
+            draft.write_text(text, encoding="utf-8", newline="")
+    except OSError as problem:
+        raise kind(f"{path}: cannot be written ({problem.strerror}); make room and run again") from None
 
 
 @contextlib.contextmanager

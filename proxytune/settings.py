@@ -43,7 +43,7 @@ SIZES: Mapping[str, tuple[float, float, str]] = {
 def nearest(name: str, known: Iterable[str]) -> str:
     """A hint that ends an error line: the nearest known name, or all of them."""
     names = sorted(known)
-    close = difflib.get_close_matches(name, names, n=1, cutoff=0.5)
+    close = difflib.get_close_matches(name, names, n=1)
     return f"did you mean '{close[0]}'?" if close else f"known are: {', '.join(names)}"
 
 
@@ -232,8 +232,10 @@ def read_settings(path: Path) -> Section:
         return Section(path, "", tomllib.loads(text))
     except FileNotFoundError:
         raise SettingsError(f"{path}: no such file; check the path") from None
-    except (OSError, UnicodeDecodeError) as problem:
-        raise SettingsError(f"{path}: cannot be read ({problem})") from None
+    except OSError as problem:
+        raise SettingsError(f"{path}: cannot be read ({problem.strerror}); check the path") from None
+    except UnicodeDecodeError:
+        raise SettingsError(f"{path}: is no text in UTF-8; save it as that") from None
     except RecursionError:
         raise SettingsError(f"{path}: is nested too deeply; write fewer brackets in one another") from None
     except ValueError as problem:  # TOML that is none, or numbers of more digits than Python reads.
@@ -252,6 +254,23 @@ def read_text(path: Path, encoding: str = "utf-8", usual_mb: float = TEXT_MB) ->
 
 
 NO_CSV = "is not a CSV file; save it as comma-separated text (UTF-8)"
+
+
+def pairs_in(option: str, text: str, shape: str) -> dict[str, str]:
+    """Values by name of an option, NAME=VALUE,NAME=VALUE.
+
+    Raises:
+        InputError: If a part is not of this shape, or a name is given twice.
+    """
+    pairs: dict[str, str] = {}
+    for part in filter(None, map(str.strip, text.split(","))):
+        name, _, value = map(str.strip, part.partition("="))
+        if not (name and value):
+            raise InputError(f"{option} {part}: write {shape}")
+        if name in pairs:
+            raise InputError(f"{option} {text}: names '{name}' twice; give each once")
+        pairs[name] = value
+    return pairs
 
 
 def table_text(path: Path, kind: type[InputError], *, missing: str = "check the path", no_text: str = NO_CSV) -> str:

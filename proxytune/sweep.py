@@ -397,9 +397,7 @@ def describe_shape(series: Series, held: float | None) -> str:
     extreme = "lowest" if series.measure.lower_is_better else "highest"
     best, near = ", ".join(map(_number, shape.best)), _listed(shape.near_best, series)
     line = f"{series.name}: {extreme} ({shape.score:.3g}) at {best}; not worse beyond noise: {near}"
-    if held is None:
-        return line
-    if "unseen" == shape.below == shape.above:
+    if held is None or "unseen" == shape.below == shape.above:
         return line
     return f"{line}; from {_number(held)} downwards it {OUTWARDS[shape.below]}, upwards it {OUTWARDS[shape.above]}"
 

@@ -156,8 +156,7 @@ def test_every_one_of_a_kind_is_documented(there, is_documented):
 
 @pytest.mark.parametrize("engine", ENGINES, ids=lambda engine: engine.name)
 def test_every_engine_is_documented_with_what_it_learns_from_and_what_installs_it(engine):
-    row = row_of("reference/engines.md", f"`{engine.name}`")
-    cells = [cell.strip() for cell in row.strip("|").split("|")]
+    cells = [cell.strip() for cell in row_of("reference/engines.md", f"`{engine.name}`").strip("|").split("|")]
     assert cells[1] == engine.learns_from
     assert engine.needs is None or f'pip install ".[{engine.needs.extra}]"' in cells[-1]
 

@@ -150,8 +150,7 @@ def everything(tmp_path, monkeypatch):
 
 @pytest.mark.slow
 def test_what_the_page_makes_keeps_the_promises_that_its_tests_check(everything):
-    mine = load("test_mine:__dict__", kind="test")
-    tests = {name: test for name, test in mine.items() if name.startswith("test_")}
+    tests = {name: test for name, test in load("test_mine:__dict__", kind="test").items() if name.startswith("test_")}
     assert len(tests) == 5
     for test in tests.values():
         test()

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 from one_line import complaint_of
 
-from proxytune.errors import SettingsError
+from proxytune.errors import InputError, SettingsError
 from proxytune.files import check_place, draft_of, draft_path, folder_draft_of, shipped, temporary_folder
 
 
@@ -35,6 +35,10 @@ def test_a_place_is_free_where_a_file_or_folder_may_come_to_be(tmp_path):
     for name in ("folder", "new", "folder/new", "not/yet/new"):
         check_place(tmp_path / name, folder=True)
     assert "folder: is a folder; give the name of a file in it" in complaint_of(check_place, tmp_path / "folder")
+    (tmp_path / "same.csv").symlink_to(tmp_path / "old.csv")
+    for name in ("old.csv", "same.csv"):
+        with pytest.raises(InputError, match=f"{name}: is read by this command, and would be lost; give another name"):
+            check_place(tmp_path / name, inputs=("gone.csv", tmp_path / "old.csv"))
 
 
 def test_a_pipe_is_not_replaced_and_a_link_in_the_drafts_place_not_followed(tmp_path):

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from one_line import complaint_of
 
-from proxytune.settings import Section, nearest, read_settings, read_text
+from proxytune.settings import Section, nearest, pairs_in, read_settings, read_text
 
 
 def section(path, **values):
@@ -62,7 +62,8 @@ def test_a_section_reads_like_a_mapping_of_plain_values():
 
 
 @pytest.mark.parametrize(
-    ("content", "says"), [(None, "no such file"), (b"a = [1", "is not valid TOML"), (b"\xff\xfe", "cannot be read")]
+    ("content", "says"),
+    [(None, "no such file"), (b"a = [1", "is not valid TOML"), (b"\xff\xfe", "no text in UTF-8")],
 )
 def test_a_file_that_is_not_toml_is_one_line(tmp_path, content, says):
     path = tmp_path / "study.toml"
@@ -73,10 +74,13 @@ def test_a_file_that_is_not_toml_is_one_line(tmp_path, content, says):
 
 def test_a_file_is_looked_for_beside_the_nearest_name_suggested_and_long_rows_are_no_long_keys(tmp_path):
     assert "cannot be read" in complaint_of(read_settings, tmp_path)
+    assert pairs_in("--at", " a = 1, b=2,", "NAME=VALUE") == {"a": "1", "b": "2"}
+    assert complaint_of(pairs_in, "--at", "a=1,a=2", "NAME=VALUE") == "--at a=1,a=2: names 'a' twice; give each once"
     section = Section(Path("/some/study.toml"), "", {"target": "../target.csv"})
     assert section.file("target") == Path("/some/../target.csv")
     assert section.file("target", "other.csv") == Path("/some/other.csv")
     assert nearest("trimm", ["trim", "delay"]) == "did you mean 'trim'?"
+    assert nearest("foo", ["robot", "trim"]) == "known are: robot, trim"
     assert nearest("zzz", ["trim", "delay"]) == "known are: delay, trim"
     path = tmp_path / "model.toml"
     path.write_text(f"weights = [{', '.join(['0.25'] * 500)}]\nrows = [\n[{', '.join(['0.5'] * 500)}],\n]\n")

@@ -9,12 +9,12 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from proxytune import report, sweep, teaching
-from proxytune.api.driving import read_theta
+from proxytune.api.driving import given_theta
 from proxytune.errors import InputError
 from proxytune.running import watching
 from proxytune.space import Theta
 from proxytune.storage import Store, locked
-from proxytune.study import StudyRun, StudySettings, family_catalogue, open_study
+from proxytune.study import StudyRun, StudySettings, open_study
 
 MOST_POINTS = 10_000
 
@@ -126,7 +126,7 @@ def run_sweep(
     elif word == "best":
         base = sweep.best_theta(study)
     else:
-        base = read_theta(word, family_catalogue(study.family, study.settings), "--at")
+        base = given_theta(word, study.settings, study.family, "--at")
     sweep.check_base(study, base)
     names = study.settings.space.names if parameter == "all" else (parameter,)
     sweeps = [sweep.plan_sweep(sweep.sweep_interval(study, name), base, points) for name in names]

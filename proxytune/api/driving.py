@@ -12,6 +12,7 @@ from proxytune.effects import SHIPPED, Catalogue, read_model
 from proxytune.errors import InputError
 from proxytune.report import frame_html
 from proxytune.seeds import episode_seed
+from proxytune.settings import pairs_in
 from proxytune.space import Theta
 from proxytune.storage import FILE_NAME as DATABASE
 from proxytune.sweep import best_theta, has_answer
@@ -82,13 +83,21 @@ def choose_theta(
         study = studies.open_settings(settings)
         if text == "best" or has_answer(study):
             return best_theta(study, option), "best"
+    return given_theta(text, settings, family, option), "nominal" if text in (None, "nominal") else "given"
+
+
+def given_theta(text: str | None, settings: studies.StudySettings, family: DomainFamily, option: str) -> Theta:
+    """θ from NAME=VALUE pairs or a model.toml of the family's robot; none for `nominal`.
+
+    Raises:
+        InputError: If it is neither, or the model is of another robot.
+    """
     if text is not None and text.endswith(".toml"):
         studies.check_robot(family, Path(text), option)
         if (own := getattr(family, "truth", None)) is not None:
             # A family with parameters that are no effects reads them itself
-            return own(Path(text)), "given"
-    theta = read_theta(text, studies.family_catalogue(family, settings), option)
-    return theta, "nominal" if text in (None, "nominal") else "given"
+            return dict(own(Path(text)))
+    return read_theta(text, studies.family_catalogue(family, settings), option)
 
 
 def read_theta(text: str | None, catalogue: Catalogue = SHIPPED, option: str = "--at") -> Theta:
@@ -101,11 +110,8 @@ def read_theta(text: str | None, catalogue: Catalogue = SHIPPED, option: str = "
         return {}
     if text.endswith(".toml"):
         return read_model(Path(text), catalogue).theta
-    pairs = [pair.partition("=") for pair in text.split(",")]
+    shape = "NAME=VALUE,NAME=VALUE, best, nominal or a model.toml"
     try:
-        theta = {name.strip(): float(value) for name, _, value in pairs}
+        return {name: float(value) for name, value in pairs_in(option, text, shape).items()}
     except ValueError:
-        raise InputError(f"{option} {text}: write NAME=VALUE,NAME=VALUE, best, nominal or a model.toml") from None
-    if len(theta) < len(pairs):
-        raise InputError(f"{option} {text}: names a parameter twice; give each once")
-    return theta
+        raise InputError(f"{option} {text}: write {shape}") from None

@@ -15,6 +15,7 @@ from proxytune.api.study import read_study
 from proxytune.effects import Catalogue, FilterContext, effect_of
 from proxytune.errors import InputError
 from proxytune.extensions import is_ours
+from proxytune.files import check_place
 from proxytune.search import History, write_optuna, write_skopt
 from proxytune.settings import figure_cautions, nearest
 from proxytune.space import Theta
@@ -97,14 +98,15 @@ def export(
     path, file = Path(model), Path(output)
     if bool(to) == (into is not None):
         raise InputError("give either --to FORMAT for a new file, or --into FILE for a patched copy of yours")
+    check_place(file, inputs=filter(None, (path, into)))
     if to in TRIALS:
         return _export_trials(path, file, to)
+    if to and to not in (report.FILTER, *WRITERS):
+        raise InputError(f"--to {to}: no such format; {nearest(to, (report.FILTER, *WRITERS, *TRIALS))}")
     instance, cautions = _instance_of(path)
     told: dict[str, Any] = {"robot": instance.robot.name, "cautions": list(cautions)}
     if into is not None:
         given = Path(into)
-        if file.resolve() == given.resolve():
-            raise InputError(f"--output {file}: is the file to be patched; give another name, so that yours is kept")
         patched = report.patch(instance, given, file, wheels)
         report.write_text(file, patched.text)
         facts = told | {"into": str(given), "has": sorted(patched.has), "diff": patched.diff}

@@ -204,11 +204,6 @@ def score(  # type: ignore[misc]  # the options above are those below
         ScoresError: If a table lacks an agent or a metric, with side, row and column.
         InputError: If a metric, a weight or another option cannot be used.
     """
-    if seed < 0:
-        raise InputError(f"seed must be at least 0, got {seed}")
-    if not usefulness.FEWEST_RESAMPLES <= resamples <= usefulness.MOST_RESAMPLES:
-        between = f"{usefulness.FEWEST_RESAMPLES} and {usefulness.MOST_RESAMPLES}"
-        raise InputError(f"resamples must be between {between}, got {resamples}")
     if (both is None) == (proxy is None) or (proxy is None) != (target is None):
         raise InputError("give the proxy's and the target's scores, or one table of both sides")
     names, header = ("proxy", "target") if both is None else ("sim", "real"), _header(target if both is None else both)
@@ -284,6 +279,18 @@ def _checked(scores: pd.DataFrame | None, side: str, columns: Mapping[str, str] 
     return scores
 
 
+def toml_text(values: Mapping[str, Any], where: str, refuse: type[InputError] = InputError) -> str:
+    """The TOML file of what was given in Python; numbers of NumPy may be among it.
+
+    Raises:
+        InputError: Or `refuse`, if something is neither text, number, truth value, list nor table.
+    """
+    try:
+        return tomlkit.dumps({key: one.item() if isinstance(one, np.generic) else one for key, one in values.items()})
+    except TypeError as problem:
+        raise refuse(f"{where}: {problem}; give texts and numbers") from None
+
+
 Description = Mapping[str, str | float]
 
 
@@ -299,11 +306,7 @@ def log_of(samples: pd.DataFrame, description: Description, commands: pd.DataFra
         LogError: If it is no such log, with table, row and column.
     """
     frames = {"samples": samples} if commands is None else {"samples": samples, "commands": commands}
-    stated = {key: one.item() if isinstance(one, np.generic) else one for key, one in description.items()}
     with as_files(frames) as folder:
-        try:
-            text = tomlkit.dumps({"name": "log", **stated})
-        except TypeError as problem:
-            raise LogError(f"log.toml: {problem}; give texts and numbers") from None
+        text = toml_text({"name": "log", **description}, "log.toml", LogError)
         (folder / "log.toml").write_text(text, encoding="utf-8")
         return read_log(folder)

@@ -14,7 +14,7 @@ from proxytune.driving import Robot, catalogue_of, is_robot, read_model_of, read
 from proxytune.effects import Catalogue, Model
 from proxytune.errors import InputError, LogError
 from proxytune.importing import Facts, Source, Wanted, as_log, open_log, read_source, with_named_pictures, write_log
-from proxytune.logs import Log, check_kind, log_cautions
+from proxytune.logs import Log, check_kind, log_cautions, without_outliers
 from proxytune.report import clocks_document, clocks_notes, frame_html, write_picture, write_text
 from proxytune.running import watching
 from proxytune.scores import ScoreTable, write_scores
@@ -220,8 +220,8 @@ class Prediction:
     def document(self) -> dict[str, Any]:
         """The JSON document of `predict --json`, without the file."""
         rmse = self.error
-        heading = {"heading": rmse.turn, "heading_unit": "rad", "poses": rmse.poses}
-        error = {"value": rmse.place, "unit": "m", **heading}
+        place, turn = (rmse.place, rmse.turn) if rmse.poses else (None, None)
+        error = {"value": place, "unit": "m", "heading": turn, "heading_unit": "rad", "poses": rmse.poses}
         facts = {"rows": len(self.poses), "windows": rmse.windows, "horizon_s": self.horizon_s}
         return facts | {"error": error, "clocks": clocks_document([self.clocks]), "cautions": list(self.cautions)}
 
@@ -309,6 +309,9 @@ def predict(
             raise InputError(f"{drives.name}: has no commands to predict poses from; give a log of drives{hint}")
         robot = _robot_of(fitted, drives, catalogue)
         cautions = (*fitted.cautions, *log_cautions(drives, robot.figures))
+        if drives.robot != fitted.robot and not known.robot:
+            cautions = (*cautions, f"the log is of the robot '{drives.robot}', and the model of '{fitted.robot}'")
+        drives = replace(drives, episodes=tuple(map(without_outliers, drives.episodes)))
         corrected, clocks = diagnosis.on_one_clock(drives, robot)
         # Else a log is predicted whole, as it was recorded, long rests and all.
         drives = corrected if clocks.differ else drives

@@ -13,9 +13,8 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
-import tomlkit
 
-from proxytune.api.scores import column_table
+from proxytune.api.scores import column_table, toml_text
 from proxytune.api.search_box import box_space
 from proxytune.api.study import StudyReport, run_quietly
 from proxytune.domain import Episode, Outcome
@@ -134,7 +133,7 @@ def tune(
             **keys,
             "parameters": {one.name: [one.low, one.high] for one in space.intervals},
         }
-        write_text(home / FILE_NAME, HEAD + tomlkit.dumps(stated))
+        write_text(home / FILE_NAME, HEAD + toml_text(stated, "tune"))
         settings = read_study_settings(home)
         own = {
             one.name: Parameter(name=one.name, unit="", low=one.low, high=one.high, neutral=float("nan"))

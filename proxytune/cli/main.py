@@ -31,7 +31,7 @@ class Parser(argparse.ArgumentParser):
         choice = re.fullmatch(r"(.*)invalid choice: '(.*)' \(choose from (.*)\)", message)
         if choice:
             where, word, listed = choice.groups()
-            known = re.findall(r"'(.*?)'", listed)
+            known = [one.strip(" '") for one in listed.split(",")]
             message = f"{where}unknown '{word}'; {nearest(word, known)}"
         super().error(message)
 

@@ -11,6 +11,7 @@ from proxytune.cli.terminal import Answer
 from proxytune.driving import is_robot, read_robot
 from proxytune.errors import InputError, RunError
 from proxytune.files import folder_draft_of
+from proxytune.settings import pairs_in
 from proxytune.skeletons import Skeleton, family_skeleton, robot_from_urdf, robot_skeleton, study_skeleton
 
 NARROW = 76
@@ -44,13 +45,15 @@ def pasteable(command: str) -> str:
     return f"  {before} \\\n      --{options}"
 
 
+SHAPE = "NAME=VALUE,NAME=VALUE with numbers"
+
+
 def read_figures(text: str | None) -> dict[str, float]:
     """Figures from NAME=VALUE pairs."""
-    pairs = [pair.partition("=") for pair in text.split(",")] if text else []
     try:
-        return {name.strip(): float(value) for name, _, value in pairs}
+        return {name: float(value) for name, value in pairs_in("--figures", text or "", SHAPE).items()}
     except ValueError:
-        raise InputError(f"--figures {text}: write NAME=VALUE,NAME=VALUE with numbers") from None
+        raise InputError(f"--figures {text}: write {SHAPE}") from None
 
 
 def _check(arguments: argparse.Namespace) -> None:

@@ -17,7 +17,7 @@ from proxytune.errors import InputError, StoreError
 from proxytune.files import check_place, folder_draft_of, shipped
 from proxytune.importing import Facts, Wanted, finite, read_geometry
 from proxytune.running import on_cluster
-from proxytune.settings import nearest
+from proxytune.settings import nearest, pairs_in
 from proxytune.study import FILE_NAME, MADE, study_around
 
 
@@ -48,18 +48,12 @@ def on_its_cluster(run: Callable[[argparse.Namespace], Result]) -> Callable[[arg
 
 def wanted_of(arguments: argparse.Namespace) -> Wanted:
     """Columns and topics to take."""
-    columns = {}
-    for part in (part.strip() for part in arguments.columns.split(",") if part.strip()):
-        ours, equals, theirs = part.partition("=")
-        if not (equals and ours.strip() and theirs.strip()):
-            raise InputError(f"--columns {part}: write OURS=THEIRS or OURS=THEIRS:UNIT, as in x=pos_x:mm")
-        columns[ours.strip()] = theirs.strip()
     return Wanted(
         commands=arguments.commands,
         poses=arguments.poses,
         frames=arguments.pictures,
         stamps=arguments.stamps,
-        columns=columns,
+        columns=pairs_in("--columns", arguments.columns, "OURS=THEIRS or OURS=THEIRS:UNIT, as in x=pos_x:mm"),
         kind=arguments.kind,
         vesc=Path(arguments.vesc) if arguments.vesc else None,
     )

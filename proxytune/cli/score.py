@@ -11,19 +11,14 @@ from proxytune.cli.options import typed
 from proxytune.cli.terminal import Answer
 from proxytune.errors import InputError
 from proxytune.files import check_place
-from proxytune.settings import nearest
+from proxytune.settings import nearest, pairs_in
 
 
 def read_sides(
     arguments: argparse.Namespace, metrics: Sequence[str]
 ) -> tuple[tuple[str, scores.ScoreTable], dict[str, scores.ScoreTable]]:
     """The target with its name, and every proxy by name."""
-    columns: dict[str, str] = {}
-    for pair in filter(None, arguments.columns.split(",")):
-        name, equals, theirs = (part.strip() for part in pair.partition("="))
-        if not (name and equals and theirs):
-            raise InputError(f"--columns {arguments.columns}: write NAME=COLUMN,..., as in agent=policy,episode=trial")
-        columns[name] = theirs
+    columns = pairs_in("--columns", arguments.columns, "NAME=COLUMN,..., as in agent=policy,episode=trial")
     files = [split_source(source)[0] for source in (*arguments.target, *arguments.proxy)] if columns else []
     found = list(dict.fromkeys(name for path in files for name in scores.column_names(path)))
     for name, theirs in columns.items():
@@ -100,9 +95,6 @@ def _present(columns: Mapping[str, str], paths: Sequence[Path]) -> dict[str, str
     return {name: theirs for name, theirs in columns.items() if theirs in found}
 
 
-LARGEST_WEIGHT = 1e70
-
-
 def _sides_given(arguments: argparse.Namespace) -> None:
     if arguments.both is not None:
         if arguments.proxy or arguments.target:
@@ -115,9 +107,6 @@ def _sides_given(arguments: argparse.Namespace) -> None:
 
 def run(arguments: argparse.Namespace) -> Answer:
     """Score one proxy, or rank several."""
-    if not usefulness.FEWEST_RESAMPLES <= arguments.resamples <= usefulness.MOST_RESAMPLES or arguments.seed < 0:
-        between = f"{usefulness.FEWEST_RESAMPLES} and {usefulness.MOST_RESAMPLES}"
-        raise InputError(f"--resamples must be between {between}, and --seed at least 0")
     if arguments.table:
         report.check_table_file("--table", arguments.table)
         check_place(arguments.table)
@@ -183,6 +172,4 @@ def _weights(texts: Sequence[str]) -> dict[str, float] | None:
             weights[name] = float(weight)
         except ValueError:
             raise InputError(f"--beta {text}: write NAME:WEIGHT, as in distance:0.5") from None
-        if abs(weights[name]) > LARGEST_WEIGHT:
-            raise InputError(f"--beta {text}: the weight must be at most {LARGEST_WEIGHT:g}")
     return weights or None

@@ -1,17 +1,19 @@
 """Commands that are options, one function of `proxytune.api`, and text: a function for each."""
 
 import argparse
+import math
 
 from rich.console import Group
 from rich.text import Text
 
 from proxytune import api, report
+from proxytune.cli.commands import names_in
 from proxytune.cli.options import check_made, facts_of, on_its_cluster, study_folder, typed, wanted_of
 from proxytune.cli.terminal import Answer, waiting
 from proxytune.errors import InputError
 from proxytune.files import check_place
 from proxytune.importing import Survey
-from proxytune.study import read_study_settings
+from proxytune.study import FILE_NAME, read_study_settings
 
 MOST_FRAMES = 1_000_000
 """As many as six digits number."""
@@ -59,9 +61,7 @@ def fleet(arguments: argparse.Namespace) -> Answer:
 
 def measure(arguments: argparse.Namespace) -> Answer:
     """`measure`: score a study's agents from every start in the domain of a model file, and write the table."""
-    if not arguments.output.absolute().parent.is_dir():
-        raise InputError(f"{arguments.output}: its folder does not exist; create it first")
-    check_place(arguments.output)
+    check_place(arguments.output, inputs=(arguments.model, arguments.path, arguments.path / FILE_NAME))
     options = {"repeats": arguments.repeats, "seed": arguments.seed}
     found = api.measure(arguments.path, arguments.model, progress=True, **options)
     found.write(arguments.output)
@@ -76,15 +76,17 @@ def measure(arguments: argparse.Namespace) -> Answer:
 
 def record(arguments: argparse.Namespace) -> Answer:
     """`record`: drive every manoeuvre, and lanes where pictures are wanted, and write the log."""
-    if not 1 <= arguments.repeats <= MOST_REPEATS or arguments.seed < 0 or not 5.0 <= arguments.seconds <= 600.0:
-        limits = f"--repeats must be between 1 and {MOST_REPEATS}, --seed at least 0 and --seconds between 5 and 600"
-        raise InputError(limits)
-    if not 0 <= arguments.frames <= MOST_FRAMES:
-        raise InputError(f"--frames must be between 0 and {MOST_FRAMES}, got {arguments.frames}")
+    bounds = {"repeats": (1, MOST_REPEATS), "seconds": (5, 600), "frames": (0, MOST_FRAMES), "seed": (0, math.inf)}
+    for name, (low, high) in bounds.items():
+        if not low <= (given := getattr(arguments, name)) <= high:
+            limits = f"between {low} and {high}" if high < math.inf else f"at least {low}"
+            raise InputError(f"--{name} must be {limits}, got {given}")
     settings = read_study_settings(arguments.path)
     if not arguments.model.is_file():
         raise InputError(f"--model {arguments.model}: no such file; check the path")
     check_place(arguments.output, folder=True)
+    if (arguments.output / "log.toml").exists():
+        raise InputError(f"{arguments.output}: holds a log; give another folder, or remove this one")
     wanted = api.Wanted(arguments.repeats, arguments.seconds, arguments.frames, arguments.seed, arguments.commands)
     with waiting("driving") as tell:
         log, cautions = api.record_log(settings, arguments.model, arguments.output, wanted, tell)
@@ -128,7 +130,8 @@ def _drive_row(one: Survey) -> tuple[str, ...]:
 def predict(arguments: argparse.Namespace) -> Answer:
     """`predict`: predict the poses of a log, or its pictures, by a model, and compare them with those measured."""
     folder = arguments.output if arguments.frames else None
-    check_place(arguments.output, folder=arguments.frames)
+    log = (arguments.log, *(arguments.log / f"{name}.csv" for name in ("samples", "commands", "frames")))
+    check_place(arguments.output, folder=arguments.frames, inputs=(arguments.model, *log))
     chosen = {"horizon_s": arguments.horizon, "wanted": wanted_of(arguments), "facts": facts_of(arguments)}
     with waiting("predicting") as tell:
         found = api.predict(arguments.model, arguments.log, frames=folder, tell=tell, **chosen)
@@ -146,7 +149,7 @@ def predict(arguments: argparse.Namespace) -> Answer:
 def export(arguments: argparse.Namespace) -> Answer:
     """`export`: write what was found for other simulators or robots, and say what went where and what has no place."""
     check_place(arguments.output)
-    wheels, has = (tuple(filter(None, given.split(","))) for given in (arguments.wheels, arguments.has))
+    wheels, has = names_in(arguments.wheels), names_in(arguments.has)
     found = api.export(arguments.model, arguments.output, to=arguments.to, into=arguments.into, wheels=wheels, has=has)
     cautions = (f"beware: {line}" for line in found.facts.get("cautions", ()))
     lines = [*cautions, *map(str, found.lines), str(arguments.output)]

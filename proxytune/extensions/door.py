@@ -218,10 +218,4 @@ def _plugin(name: str, kind: str, installed: Mapping[str, Any], shipped: Mapping
         known = (*shipped, *installed)
         hint = nearest(name, known) if known else "no plug-in of this kind is installed"
         raise ExtensionError(f"{kind} '{name}' is unknown (your own is written module:attribute); {hint}")
-    try:
-        return installed[name].load()
-    except BaseException as problem:
-        if is_users(problem):
-            raise
-        raised = f"its plug-in {installed[name].value} raised {describe(problem)}"
-        raise ExtensionError(f"{kind} '{name}': {raised}; correct or uninstall it") from problem
+    return ask(f"{kind} '{name}': its plug-in {installed[name].value}", installed[name].load)

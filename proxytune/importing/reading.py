@@ -231,6 +231,8 @@ def open_log(
         return
     path = Path(source)
     if (path / "log.toml").is_file() or (path / "samples.csv").is_file():
+        if wanted != NOTHING or facts.clock_offset:
+            raise LogError(f"{path}: is a log already; state it in log.toml, as in clock_offset_s, not by options")
         yield read_log(path), ()
         return
     found = read_source(path, wanted, facts.offset_s)

@@ -13,6 +13,7 @@ import numpy as np
 from proxytune.errors import LogError
 from proxytune.importing.bag import Bag, Topic, choose_times, collect
 from proxytune.importing.source import Commands, finite
+from proxytune.settings import table_text
 
 KIND = "std_msgs/msg/Float64 of a VESC"
 """What the type of a motor's topic is called where its servo's stands beside it."""
@@ -66,12 +67,8 @@ def read_vesc(bag: Bag, motor: str, gains: Path | None) -> tuple[Commands, tuple
 
 
 def _read_gains(path: Path) -> tuple[float, ...]:
-    if not path.is_file():
-        raise LogError(f"{path}: no such file; give the car's vesc.yaml")
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError):
-        raise LogError(f"{path}: cannot be read as text; give the car's vesc.yaml") from None
+    remedy = "give the car's vesc.yaml"
+    text = table_text(path, LogError, missing=remedy, no_text=f"cannot be read as text; {remedy}")
     gains = []
     for name in GAINS:
         # At the top in ROS 1, below a node's name in ROS 2.

@@ -103,9 +103,9 @@ def _axes(drives: list[Chords]) -> Iterator[str]:
     """Tell where the robot moves in a mirror: x or y reversed, or exchanged, and headings not."""
     names = ("speed", "course", "heading")
     speed, course, heading = (np.concatenate([getattr(one, name) for one in drives]) for name in names)
-    if len(speed) < ENOUGH:
+    moves = speed >= max(MOVES * float(np.quantile(speed, 0.9)), 1e-9) if len(speed) >= ENOUGH else np.array([False])
+    if not moves.any():
         return
-    moves = speed >= max(MOVES * float(np.quantile(speed, 0.9)), 1e-9)
     course, heading = course[moves], heading[moves]
     # Doubled angles: backwards is as good as forwards
     together, mirrored, spread = (

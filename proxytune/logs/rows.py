@@ -136,8 +136,9 @@ def read_rows(
     stuck = rows.follows & (np.diff(time) <= 0)
     if stuck.any():
         row = int(np.argmax(stuck)) + 1
-        late = f"{time[row]:.12g} s does not come after {time[row - 1]:.12g} s"
-        raise rows.error(row, "time", f"{late} of the row before; sort the rows by time")
+        late = f"{time[row]:.12g} s does not come after {time[row - 1]:.12g} s of the row before"
+        remedy = "take one of them out" if time[row] == time[row - 1] else "sort the rows by time"
+        raise rows.error(row, "time", f"{late}; {remedy}")
     return rows
 
 
@@ -183,7 +184,9 @@ def _check_header(path: Path, header: Sequence[str], needed: Names, why: str, to
     needed = (*needed, *together) if set(together) & set(header) else needed
     for name in header:
         if name not in known:
-            raise LogError(f"{path}: line 1: unknown column '{name}'; {nearest(name, known)}")
+            parted = len(header) == 1 and any(mark in name for mark in ";\t")
+            remedy = "separate columns by commas, or have `import` read it" if parted else nearest(name, known)
+            raise LogError(f"{path}: line 1: unknown column '{name}'; {remedy}")
         if list(header).count(name) > 1:
             raise LogError(f"{path}: line 1: names the column '{name}' twice; take one of them out")
     for name in needed:

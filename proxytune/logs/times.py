@@ -20,6 +20,8 @@ OFF_GRID = 0.25 + 1e-6
 """A row may be this far from its place on the grid of times, in samples."""
 SPARSEST = 10
 """A log with more missing rows than this for each row that it has states its times or its rate wrongly."""
+SHORTEST_S, LONGEST_S = 1e-5, 10.0
+"""Poses whose usual distance in time is beyond these are not timed in seconds."""
 
 
 def places_on_grid(samples: Rows, rate_hz: float) -> tuple[Whole, Whole]:
@@ -166,7 +168,7 @@ def episodes_at_own_times(
     """
     usual = usual_rate(samples)
     _check_density(samples, usual)
-    rate_hz = usual * math.ceil(STEPS_HZ / usual - 0.05)
+    rate_hz = usual * max(1, math.ceil(STEPS_HZ / usual - 0.05))
     placed = np.column_stack((samples.columns(POSE[:2]), unwrapped(samples)))
     wheels = samples.columns(WHEELS) if WHEELS[0] in samples.values else None
     firsts = (*samples.firsts, len(samples.lines))
@@ -201,7 +203,9 @@ def on_own_grid(times: Floats, poses: Floats, rate_hz: float) -> tuple[Floats, F
 
 
 def _check_density(samples: Rows, usual: float) -> None:
-    """Refuse poses so few for the time that they cover that their times cannot be seconds."""
+    """Refuse poses so many or so few for the time that they cover that their times cannot be seconds."""
+    if not SHORTEST_S < 1.0 / usual < LONGEST_S:
+        raise samples.error(1, "time", f"poses are usually {1.0 / usual:.3g} s apart; write seconds")
     times = samples.values["time"]
     gaps = np.append(np.diff(times) * samples.follows, 0.0)
     if gaps.sum() * usual > SPARSEST * len(times):

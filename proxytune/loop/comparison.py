@@ -203,8 +203,7 @@ HALF = 0.3
 def prpv_figure(rows: Sequence[Compared]) -> Figure:
     """A panel per set of agents: PRPV before and after with 95 % intervals, over the bracket of the noise floor."""
     rows = [row for row in rows if row.key in ("prpv", "held_out")]
-    figure = Figure(figsize=(report.COLUMN, 0.62 * report.COLUMN), layout="constrained")
-    panels = figure.subplots(1, len(rows), squeeze=False)[0]
+    figure, (panels,) = report.grid_of(0.62 * report.COLUMN, 1, len(rows))
     for axes, row in zip(panels, rows, strict=True):
         report.dress(axes)
         for place, (level, colour) in enumerate(((row.before, report.VERMILLION), (row.after, report.BLUE))):

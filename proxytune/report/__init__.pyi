@@ -56,6 +56,7 @@ from .figure_style import (
     VERMILLION as VERMILLION,
     LineName as LineName,
     dress as dress,
+    grid_of as grid_of,
     name_lines as name_lines,
 )
 from .fleet import (

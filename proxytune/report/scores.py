@@ -39,8 +39,7 @@ def _say_prpv(assessment: Assessment, proxy: str, target: str) -> str:
     prpv, inner, random = assessment.prpv, assessment.prpv_interval, assessment.chance
     floor = assessment.noise_floor
     chance = f"{short(random.mean)} ± {short(random.deviation)}, p = {random.p_value:.2g}"
-    known = None not in (floor.value, floor.low, floor.high)
-    level = with_span(floor.value, floor.low, floor.high) if known and floor.value is not None else ""
+    level = "" if floor.value is None else with_span(floor.value, floor.low, floor.high)
     if random.explains:
         worth = f"no better than chance ({chance})"
     elif assessment.at_noise_floor:

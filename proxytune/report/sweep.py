@@ -3,7 +3,6 @@
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
-from hashlib import sha256
 from itertools import cycle, groupby
 from pathlib import Path
 from textwrap import fill
@@ -16,6 +15,7 @@ from matplotlib.ticker import MaxNLocator
 from rich.console import Group, RenderableType
 
 from proxytune.files import csv_text
+from proxytune.identity import digest
 from proxytune.report import figure_style as style
 from proxytune.report.html import write_page
 from proxytune.report.scores import score_document
@@ -47,7 +47,7 @@ def curve_name(curve: SweepCurve) -> str:
 def held_mark(base: Theta) -> str:
     """Six characters that stand for the values that parameters are held at."""
     values = sorted((name, float(value)) for name, value in base.items())
-    return sha256(json.dumps(values).encode()).hexdigest()[:6]
+    return digest(json.dumps(values), length=6)
 
 
 def held_texts(curve: SweepCurve) -> list[str]:

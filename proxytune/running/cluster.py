@@ -42,22 +42,22 @@ def _say(line: str) -> None:
 
 
 @contextmanager
-def on_cluster(address: str, say: Callable[[str], None] = _say) -> Iterator[None]:
+def on_cluster(address: str) -> Iterator[None]:
     """Have all pieces of work done by a cluster's workers meanwhile, as many at once as there are workers.
 
     Workers may leave and join: what a lost one was doing is done by another, and new ones have work at once. Where
-    none is left, or the scheduler is lost, it is waited for them.
+    none is left, or the scheduler is lost, it is waited for them. Waiting, and each worker that is not used, is said in
+    a line on standard error.
 
     Args:
         address: Of the cluster's scheduler, as in tcp://127.0.0.1:8786.
-        say: Hears in one line what is waited for, and of each worker that is not used; standard error by default.
 
     Raises:
         ExtensionError: If `distributed` is not installed.
         InputError: If nothing answers there, or a worker has other code, other packages or several threads.
         RunError: If no worker joins.
     """
-    cluster = Cluster(address, say)
+    cluster = Cluster(address)
     try:
         cluster.check()
         with elsewhere(cluster):
@@ -182,16 +182,16 @@ Key = tuple[str, str]
 class Cluster:
     """The workers of a scheduler, as a `Place`."""
 
-    def __init__(self, address: str, say: Callable[[str], None] = _say) -> None:
+    def __init__(self, address: str) -> None:
         self.made_by: Mapping[str, str] = made_by()
-        self._address, self._hears = address, say
+        self._address = address
         self._clock, self._woken = AwakeClock(), threading.Event()
         self._workers: dict[Key, _Worker] = {}
         self._asked, self._answers, self._checked = -POLL_S, False, False
         self._client = self._connected()
 
     def _say(self, line: str) -> None:
-        self._hears(f"--address {self._address}: {line}")
+        _say(f"--address {self._address}: {line}")
 
     def _connected(self) -> Any:
         try:

@@ -1,7 +1,6 @@
 """Work as it goes to other processes, which end with the one that sent it, and to machines with the same code."""
 
 import faulthandler
-import hashlib
 import os
 import pickle
 import signal
@@ -20,7 +19,7 @@ import cloudpickle
 
 from proxytune.errors import InputError, RunError
 from proxytune.extensions import Packed, describe, folders, open_folders, pack, place_of, unpack
-from proxytune.identity import version_changes, versions_of
+from proxytune.identity import digest, version_changes, versions_of
 from proxytune.starting import LastingStream
 
 WATCH_S = 0.5
@@ -132,8 +131,7 @@ def made_by() -> Mapping[str, str]:
     """What results depend on besides their settings: proxytune's own code, Python and packages."""
     paths = {path.relative_to(HOME).as_posix(): path for path in sorted(HOME.rglob("*.py"))}
     own = {name: path.read_bytes() for name, path in paths.items() if not name.startswith(DATA)}
-    digest = hashlib.sha256(repr(own).encode()).hexdigest()[:12]
-    return {"proxytune": f"code {digest}", "Python": python_version(), **versions_of(PACKAGES)}
+    return {"proxytune": f"code {digest(own, length=12)}", "Python": python_version(), **versions_of(PACKAGES)}
 
 
 def check_code(theirs: Mapping[str, str]) -> None:

@@ -33,7 +33,7 @@ COUNTS = ("n", "trials", "rollouts", "n trials", "n rollouts", "num trials", "n 
 ERRORS = ("se", "sem", "stderr", "std error", "standard error")
 MOST_ROLLOUTS = 100_000
 NUMBER = r"[-−+]?\d*[.,]?\d+(?:[eE][-+]?\d+)?"
-OF = re.compile(r"(\d+)\s*(?:/|of|out of)\s*(\d+)")
+OF = re.compile(r"(\d{1,9})\s*(?:/|of|out of)\s*(\d{1,9})")
 CELL = re.compile(rf"({NUMBER})\s*(%?)(?:\s*(?:±|\+/-|\+-)\s*({NUMBER})\s*(%?))?\s*(%?)")
 
 
@@ -117,7 +117,7 @@ def _literal(path: Path, name: str | None) -> Mapping[str, Any]:
         if isinstance(node, ast.Assign) and isinstance(node.value, ast.Dict) and isinstance(node.targets[0], ast.Name):
             try:
                 known[node.targets[0].id] = ast.literal_eval(node.value)
-            except ValueError:
+            except (ValueError, TypeError):
                 continue
     if name is None and len(known) == 1:
         return next(iter(known.values()))
@@ -188,7 +188,7 @@ Read = tuple[float, float | None, tuple[int, int] | None]
 """A mean, its standard error, and successes of rollouts; the latter two where they are known."""
 
 
-def read_cell(text: str, decimal: str, in_percent: bool) -> Read | None:
+def read_cell(text: str, in_percent: bool) -> Read | None:
     """What a cell says; None if it is a plain number, or nothing that is known here."""
     counts = OF.fullmatch(text)
     if counts is not None:
@@ -199,7 +199,7 @@ def read_cell(text: str, decimal: str, in_percent: bool) -> Read | None:
         return None
     scale = 100.0 if in_percent or "%" in text else 1.0
     mean, error = (
-        float(part.replace("−", "-").replace(decimal, ".")) / scale if part else None for part in (found[1], found[3])
+        float(part.replace("−", "-").replace(",", ".")) / scale if part else None for part in (found[1], found[3])
     )
     return None if mean is None else (mean, error, None)
 
@@ -210,8 +210,9 @@ def counted(value: float, rollouts: str, where: str) -> tuple[int, int]:
         of = int(rollouts)
     except ValueError:
         raise ScoresError(f"{where}: the number of rollouts must be a whole number, got {rollouts!r}") from None
-    done = value * of if value <= 1.0 and not (value == 1.0 and of == 1) else value
-    if not 1 <= of <= MOST_ROLLOUTS or not 0 <= done <= of:
+    within = 1 <= of <= MOST_ROLLOUTS
+    done = value * of if within and value <= 1.0 and not (value == 1.0 and of == 1) else value
+    if not within or not 0 <= done <= of:
         raise ScoresError(f"{where}: {value:g} successes of {of} rollouts cannot be; check both columns")
     if not math.isclose(done, round(done), abs_tol=0.05 + 0.005 * of):
         raise ScoresError(f"{where}: {value:g} of {of} rollouts is no whole number of successes; check both columns")

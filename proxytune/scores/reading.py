@@ -16,7 +16,7 @@ import numpy as np
 
 from proxytune.arrays import Floats
 from proxytune.errors import ScoresError
-from proxytune.files import csv_text, draft_of
+from proxytune.files import csv_text, write_or_refuse
 from proxytune.scores import forms
 from proxytune.scores.table import LARGEST, ScoreTable
 from proxytune.settings import NO_CSV, nearest, table_text
@@ -151,7 +151,7 @@ def _read(
 ) -> tuple[str, float, tuple[int, int] | None]:
     """What a row says of a metric: its text, its standard error (0: not known), and successes of rollouts."""
     text, error, scale = own[name], 0.0, 100.0 if in_percent else 1.0
-    read, where = forms.read_cell(text, found.decimal, in_percent), f"{found.path}: line {line}, column '{name}'"
+    read, where = forms.read_cell(text, in_percent), f"{found.path}: line {line}, column '{name}'"
     if read is not None:
         text, error = repr(read[0]).replace(".", found.decimal), read[1] or 0.0
         if read[2] is not None:
@@ -364,8 +364,4 @@ def write_scores(table: ScoreTable, path: Path) -> None:
     """Write a table as CSV, the same bytes for the same table; an interrupted write leaves the old file."""
     driven = np.argwhere(table.driven)
     rows = ([table.agents[row], table.episodes[at], *map(repr, table.values[row, at].tolist())] for row, at in driven)
-    try:
-        with draft_of(path) as draft:
-            draft.write_text(csv_text(["agent", "episode", *table.metrics], rows), encoding="utf-8", newline="")
-    except OSError as problem:
-        raise ScoresError(f"{path}: cannot be written ({problem.strerror})") from None
+    write_or_refuse(path, csv_text(["agent", "episode", *table.metrics], rows), ScoresError)

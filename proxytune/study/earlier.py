@@ -14,14 +14,13 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from os.path import exists
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 
 from proxytune.domain import Episode, Instance, instance_of
 from proxytune.errors import InputError, StoreError
-from proxytune.files import draft_of, shipped
+from proxytune.files import shipped, temporary_folder, write_or_refuse
 from proxytune.search import Trial
 from proxytune.seeds import episode_seed
 from proxytune.settings import is_finite, read_text
@@ -30,7 +29,7 @@ from proxytune.study.facts import COPIED, stored_facts, study_facts
 from proxytune.study.opening import Study
 from proxytune.study.preflight import PLACEMENT, placement_variance
 from proxytune.study.settings import LEARNING, StudySettings, read_study_settings
-from proxytune.study.study_run import StudyRun, compose_of
+from proxytune.study.study_run import Spent, StudyRun, compose_of
 
 AGAIN = 12
 """So many episodes of a source are driven again where its code or versions are others."""
@@ -95,7 +94,7 @@ def _otherwise(run: StudyRun, source: Source, *keys: str) -> list[str]:
 def table_alone(study: Study) -> Iterator[StudyRun]:
     """A bank of which nothing but its table is there, as a run that knows its trials; nothing is driven."""
     settings = replace(study.settings, learn_from=(BANK_FILE,))
-    with TemporaryDirectory() as folder, Store.open(Path(folder)) as store:
+    with temporary_folder() as folder, Store.open(folder) as store:
         run, source = StudyRun(replace(study, settings=settings), store), read_source(settings, BANK_FILE)
         _keep(run, [source], again=False)
         store.save_fact(PLACEMENT, dict(source.placement))
@@ -148,8 +147,10 @@ def known_trials(run: StudyRun) -> tuple[Trial, ...]:
 def _copied(run: StudyRun, key: str) -> list[Trial]:
     """The trials that the store holds for a key, with the outputs of this study's agents and metrics."""
     table, fact = run.study.target, COPIED[key]
+    learnt = run.store.facts().get(fact)
+    if learnt is None:
+        raise StoreError(f"{run.store.path}: has nothing of {key} yet; run the study first")
     try:
-        learnt = run.store.facts()[fact]
         rows = [learnt["agents"].index(agent) for agent in table.agents]
         metrics = [learnt["metrics"].index(name) if name in learnt["metrics"] else -1 for name in table.metrics]
         shape = (len(learnt["trials"]), len(learnt["agents"]), len(learnt["metrics"]))
@@ -258,11 +259,7 @@ def write_table(run: StudyRun) -> Path:
     }
     table = {"format": FORMAT, "facts": dict(source.facts), "metrics": metrics, "agents": list(agents), "trials": rows}
     table["placement"] = placement
-    try:
-        with draft_of(path) as draft:
-            draft.write_text(json.dumps(table, separators=(",", ":"), allow_nan=False) + "\n", encoding="utf-8")
-    except OSError as problem:
-        raise StoreError(f"{path}: cannot be written ({problem.strerror}); make room and run again") from None
+    write_or_refuse(path, json.dumps(table, separators=(",", ":"), allow_nan=False) + "\n", StoreError)
     return path
 
 
@@ -310,10 +307,12 @@ def _check_again(run: StudyRun, source: Source) -> None:
     mine = [cell for cell in cells if cell[1] in run.settings.agents and cell[2] < run.settings.starts]
     chosen = [mine[row] for row in np.unique(np.linspace(0, len(mine) - 1, AGAIN).round().astype(int))]
     planned = [source.episode(*cell) for cell in chosen]
+    before = run.spent.episodes
     found = run.outcomes(planned, f"episodes of {source.path.name} again")
+    run.spent += Spent(unused=run.spent.episodes - before)
     for (theta, agent, start), episode in zip(chosen, planned, strict=True):
-        before, now = source.trials[theta][agent, start], found[episode].metrics or {}
-        for name, value in before.items():
+        now = found[episode].metrics or {}
+        for name, value in source.trials[theta][agent, start].items():
             again = now.get(name, float("inf")) if name in _metrics(run) else value
             if abs(again - value) > TOLERANCE * max(abs(value), TOLERANCE):
                 told = f"its code or versions are others, and {agent} from start {start} has {name} {value:.4g} there"

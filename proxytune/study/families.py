@@ -15,7 +15,7 @@ import numpy as np
 
 from proxytune.arrays import Floats
 from proxytune.errors import StoreError
-from proxytune.files import draft_of
+from proxytune.files import write_or_refuse
 from proxytune.learning import LearningEstimate
 from proxytune.scores import ScoreTable
 from proxytune.seeds import fresh_seed
@@ -165,13 +165,8 @@ def save_lessons(settings: StudySettings, lessons: Mapping[str, Lesson]) -> None
     Raises:
         StoreError: If it cannot be written.
     """
-    path = _file(settings)
     text = json.dumps({name: asdict(one) for name, one in lessons.items()}, indent=2, allow_nan=False) + "\n"
-    try:
-        with draft_of(path) as draft:
-            draft.write_text(text, encoding="utf-8")
-    except OSError as problem:
-        raise StoreError(f"{path}: cannot be written ({problem.strerror}); make room and run again") from None
+    write_or_refuse(_file(settings), text, StoreError)
 
 
 def read_lessons(settings: StudySettings) -> dict[str, Lesson]:

@@ -71,11 +71,6 @@ class StudyResult:
         return f"StudyResult of '{self.study.settings.name}': {len(self.trials)} trials; {self.best!r}"
 
     @property
-    def unidentified(self) -> tuple[str, ...]:
-        """The parameters of which nearly any value in the box is compatible with the target."""
-        return self.knowledge.unidentified
-
-    @property
     def inside(self) -> bool:
         """True if the best θ lies in the 95 % region, which is by every metric of every agent."""
         return self.knowledge.holds(self.knowledge.space.values(self.best.trial.theta))

@@ -1,7 +1,5 @@
 from .assessment import (
-    FEWEST_RESAMPLES as FEWEST_RESAMPLES,
     LEFT_OUT as LEFT_OUT,
-    MOST_RESAMPLES as MOST_RESAMPLES,
     PAIRED as PAIRED,
     PERFECT as PERFECT,
     Assessment as Assessment,

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from proxytune.errors import ScoresError
+from proxytune.errors import InputError, ScoresError
 from proxytune.scores import Metric, ScoreTable, score_cautions
 from proxytune.usefulness import resampling
 from proxytune.usefulness.comparison import Comparison, compare, repeats
@@ -242,6 +242,10 @@ def assess_each(
     seed: int = 0,
 ) -> tuple[dict[str, Assessment], Selection | None]:
     """Assess proxies of one target by name, and rank them where there are several."""
+    if seed < 0:
+        raise InputError(f"seed must be at least 0, got {seed}")
+    if not FEWEST_RESAMPLES <= resamples <= MOST_RESAMPLES:
+        raise InputError(f"resamples must be between {FEWEST_RESAMPLES} and {MOST_RESAMPLES}, got {resamples}")
     found = {
         name: assess(proxy=one, target=target, metrics=metrics, beta=beta, asked=asked, resamples=resamples, seed=seed)
         for name, one in proxies.items()

@@ -21,6 +21,7 @@ from proxytune.errors import InputError
 from proxytune.scores import ROUNDING, ScoreTable
 from proxytune.settings import nearest
 from proxytune.usefulness.comparison import Comparison, by_start, start_of
+from proxytune.usefulness.predictivity import orders
 from proxytune.usefulness.resampling import CONFIDENCE, Ends, interval
 from proxytune.usefulness.saving import Saving, effective, is_rate, rate_intervals, saving_of
 
@@ -421,13 +422,9 @@ def mmrv_conventions(inputs: Comparison) -> dict[str, dict[str, float]]:
         return {}
     found = {}
     for column, metric in enumerate(inputs.metrics):
-        gaps, orders = [], []
-        for means in inputs.means:
-            merits = (1.0 if metric.direction == "max" else -1.0) * means[:, column]
-            gap = merits[:, None] - merits
-            gaps.append(np.abs(gap))
-            orders.append(np.where(np.abs(gap) > ROUNDING * np.abs(merits).max(), np.sign(gap), 0.0))
-        (ours, theirs), (one, other) = gaps, orders
+        sides = [(1.0 if metric.direction == "max" else -1.0) * means[:, [column]] for means in inputs.means]
+        ours, theirs = (np.abs(side - side.T) for side in sides)
+        one, other = (orders(side)[..., 0] for side in sides)
         simpler = (one > 0) != (other > 0)
         costs = {"simpler": theirs * simpler, "strictly_less": theirs * ((one < 0) != (other < 0))}
         costs |= {"sign_product": theirs * (one * other < 0), "proxy_gap": ours * simpler}

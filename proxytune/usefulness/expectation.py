@@ -21,7 +21,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from proxytune.arrays import Flags, Floats, Whole
+from proxytune.arrays import NORMAL_95, Flags, Floats, Whole
 from proxytune.scores import Metric, ScoreTable
 from proxytune.usefulness.comparison import Comparison, compare, start_places
 from proxytune.usefulness.noise import NoiseFloor
@@ -37,7 +37,6 @@ OTHER_ATOMS = 10.0
 """How far, in ranks, a pair at other such values is off."""
 MODELLED = 10.0
 """The variance of repeated tables counts as so many fresh ones."""
-NORMAL = 1.96
 
 
 class Estimate(NamedTuple):
@@ -182,13 +181,13 @@ def _expected(
         # Nothing tells of noise.
         return Expected(Estimate(middle, 0.0, most), None, None), 0.0
     variance = ((m - 1) * own + MODELLED * modelled) / counts
-    reach = float(student.ppf(0.975, counts)) if m > 1 else NORMAL
+    reach = float(student.ppf(0.975, counts)) if m > 1 else NORMAL_95
     half = reach * np.sqrt(variance / m)
     value = Estimate(middle, max(0.0, middle - half), min(most, middle + half))
     if perfect is None:
         return Expected(value, None, None), float(np.sqrt(variance))
     levels = measure(perfect)
-    more, wide = middle - float(levels.mean()), NORMAL * np.sqrt(variance / m + levels.var())
+    more, wide = middle - float(levels.mean()), NORMAL_95 * np.sqrt(variance / m + levels.var())
     floor = Estimate(float(levels.mean()), *interval(levels))
     return Expected(value, floor, Estimate(more, more - wide, more + wide)), float(np.sqrt(variance))
 

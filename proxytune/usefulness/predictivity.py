@@ -21,6 +21,7 @@ from proxytune.usefulness.comparison import Comparison
 from proxytune.usefulness.pairs import FEW_AGENTS, by_table, kendall_of_table, violations_of_table
 
 SMALLEST_SPREAD = 1e-150
+LARGEST_WEIGHT = 1e70
 
 
 @dataclass(frozen=True)
@@ -63,8 +64,8 @@ def ppv(inputs: Comparison, beta: Mapping[str, float] | None = None) -> Ppv:
         for name, weight in beta.items():
             if name not in names:
                 raise InputError(f"weight of '{name}': no such metric; {nearest(name, names)}")
-            if not (np.isfinite(weight) and weight >= 0):
-                raise InputError(f"weight of '{name}': must be zero or more, got {weight}")
+            if not 0.0 <= weight <= LARGEST_WEIGHT:
+                raise InputError(f"weight of '{name}': must be zero to {LARGEST_WEIGHT:g}, got {weight}")
         if missing := [name for name in names if name not in beta]:
             raise InputError(f"no weight is given for {', '.join(missing)}; give one for every metric or none at all")
         weights = np.array([beta[name] for name in names])
@@ -93,7 +94,7 @@ def mmrv_of_means(proxy: Floats, target: Floats, metrics: Sequence[Metric]) -> F
     signs = np.array([1.0 if metric.direction == "max" else -1.0 for metric in metrics])
     if proxy.shape[-2] > FEW_AGENTS:
         return np.asarray(by_table(violations_of_table, proxy * signs, target * signs).mean(axis=-2), dtype=np.float64)
-    violated = (_orders(proxy * signs) > 0.0) != (_orders(target * signs) > 0.0)
+    violated = (orders(proxy * signs) > 0.0) != (orders(target * signs) > 0.0)
     costs = np.abs(target[..., :, None, :] - target[..., None, :, :]) * violated
     return np.asarray(costs.max(axis=-2).mean(axis=-2), dtype=np.float64)
 
@@ -134,7 +135,7 @@ def kendall_of_means(proxy: Floats, target: Floats) -> Floats:
     """Kendall's τ-b between two domains, shapes as in pearson_of_means."""
     if proxy.shape[-2] > FEW_AGENTS:
         return by_table(kendall_of_table, proxy, target)
-    one, other = _orders(proxy), _orders(target)
+    one, other = orders(proxy), orders(target)
     concordant = (one * other).sum(axis=(-2, -3))
     pairs = np.abs(one).sum(axis=(-2, -3)) * np.abs(other).sum(axis=(-2, -3))
     return np.asarray(concordant / np.sqrt(np.where(pairs > 0, pairs, np.nan)), dtype=np.float64)
@@ -150,7 +151,7 @@ def kendall_tau(inputs: Comparison) -> Correlation:
     return _correlation("Kendall's τ", kendall_of_means(*inputs.means), inputs)
 
 
-def _orders(means: Floats) -> Floats:
+def orders(means: Floats) -> Floats:
     """Sign of the difference of every two agents, shape (…, agents, agents, metrics), zero for ties."""
     differences = means[..., :, None, :] - means[..., None, :, :]
     tie = ROUNDING * np.abs(means).max(axis=-2)[..., None, None, :]

@@ -35,7 +35,7 @@ PROXY_PRIOR = 8.0
 MOST_ROLLOUTS = 100_000
 SCALE_SHARE = 0.05
 MOST_BETS = 20_000_000
-PATHS, MOST_ROUNDS = 200, 1000
+PATHS, MOST_ROUNDS = 50, 1000
 
 
 @dataclass(frozen=True)
@@ -148,7 +148,8 @@ def sequential_test(inputs: Comparison, column: int = 0, *, seed: int = 0) -> Se
     foretold = np.array([_order(row[driven], metric.direction).mean() for row, driven in zip(
         inputs.proxy.values[..., column], inputs.proxy.driven, strict=True)])  # fmt: skip
     outcomes = np.stack([row[:rounds] for row in values])[None]
-    wealth = wealth_of(outcomes, foretold if foretold.min() >= 0.0 and foretold.max() <= 1.0 else None)[0]
+    bet = foretold if foretold.min() >= 0.0 and foretold.max() <= 1.0 else None
+    wealth = wealth_of(outcomes, bet)[0]
     threshold = (len(agents) - 1) / LEVEL
     least = wealth.min(axis=-1)  # (rounds, agents)
     crossed = np.argwhere(np.maximum.accumulate(wealth, axis=0).min(axis=-1) >= threshold)
@@ -156,8 +157,8 @@ def sequential_test(inputs: Comparison, column: int = 0, *, seed: int = 0) -> Se
     evidence = dict(zip(agents, map(float, least[-1]), strict=True))
     rates = np.array([(row.sum() + PRIOR) / (len(row) + 2 * PRIOR) for row in values])
     rng = np.random.default_rng(seed)
-    bets = {"with proxy": foretold, "without proxy": None}
-    expected = {name: expected_rounds(rates, bet, rng) for name, bet in bets.items()}
+    bets = {"with proxy": bet, "without proxy": None}
+    expected = {name: expected_rounds(rates, each, rng) for name, each in bets.items()}
     return Sequential(winner, at, rounds, evidence, threshold, expected)
 
 
@@ -196,7 +197,7 @@ def expected_rounds(rates: Floats, foretold: Floats | None, rng: np.random.Gener
     """The median of rounds until the best is shown, were the rates these; None beyond 1000."""
     rivals = np.argsort(-rates)[:4]  # the nearest decide
     foretold = None if foretold is None else foretold[rivals]
-    outcomes = (rng.random((PATHS // 4, len(rivals), MOST_ROUNDS)) < rates[rivals][:, None]).astype(np.float64)
+    outcomes = (rng.random((PATHS, len(rivals), MOST_ROUNDS)) < rates[rivals][:, None]).astype(np.float64)
     least = wealth_of(outcomes, foretold)[:, :, 0].min(axis=-1) >= (len(rates) - 1) / LEVEL
     first = np.where(least.any(axis=1), least.argmax(axis=1) + 1, MOST_ROUNDS + 1)
     middle = int(np.median(first))

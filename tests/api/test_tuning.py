@@ -101,7 +101,7 @@ def test_a_function_of_theta_and_agent_with_one_score_is_enough():
         scores,
         metrics="success:max",
         columns={"agent": "policy"},
-        budget=3,
+        budget=np.int64(3),
         preflight=False,
         confirm=0,
     )
@@ -113,6 +113,7 @@ def test_a_function_of_theta_and_agent_with_one_score_is_enough():
     ("options", "said"),
     [
         ({"metrics": "distanc:max"}, "scores: no column 'distanc'; did you mean 'distance'?"),
+        ({"seed": None}, "tune: Unable to convert"),
         ({"enginee": "gp"}, "enginee: unknown key; did you mean 'engine'?"),
         ({"known": [{"gain": 9.0, "drag": 0.0}]}, "known: row 0: gain is 9, outside [0.5, 2]"),
         ({"known": [{"gain": 1.0}]}, "known: row 0: has no 'drag'; give each parameter of the box"),

@@ -145,8 +145,7 @@ def test_the_saving_is_paired_by_seed_and_a_run_beyond_the_budget_counts_as_one_
 
 def test_answers_are_measured_by_what_the_truth_scores_and_a_failed_one_as_the_worst_point():
     default = [made("gp", seed, [0.0], error=0.1) for seed in (1, 2)]
-    rival = [made("tpe", 1, [0.0], 2.0, error=0.2), made("tpe", 2, [0.0], None, error=0.4)]
-    found = summarise(rival, default, 4.0)
+    found = summarise([made("tpe", 1, [0.0], 2.0, error=0.2), made("tpe", 2, [0.0], None, error=0.4)], default, 4.0)
     assert found.of_truth.value == 7.0 / 5.0, "of the answer that has a score; the truth's is 5"
     assert found.error_difference.value == pytest.approx(0.2)
     assert summarise(default, default, 4.0).error_difference is None

@@ -123,7 +123,6 @@ def test_predict_leaves_no_table_but_pictures(tmp_path, interrupted, ctrl_c):
     log = write_still_frames(tmp_path / "log", {}, lane_poses(12), columns=80)
     (tmp_path / "model.toml").write_text(MODEL)
     ctrl_c(13)
-    words = ("predict", tmp_path / "model.toml", log, "--frames", "--output", tmp_path / "out")
-    files = interrupted(tmp_path, *words)
+    files = interrupted(tmp_path, *("predict", tmp_path / "model.toml", log, "--frames", "--output", tmp_path / "out"))
     assert "out/frames.csv" not in files
     assert len([name for name in files if name.startswith("out/frames/")]) == 12

@@ -98,8 +98,7 @@ def test_diagnose_takes_a_folder_of_tables_and_names_what_the_robot_has(answered
     look_for_few(monkeypatch, "wheel_gain")
     monkeypatch.chdir(tmp_path)
     drives = [foreign_robot.drive(100 + number, seconds=20.0, offset_s=-0.25) for number in range(3)]
-    home = foreign_robot.write_form(tmp_path, "csv", drives)
-    found = answered("diagnose", home, "--robot", "nobodys", *FIGURES)
+    found = answered("diagnose", foreign_robot.write_form(tmp_path, "csv", drives), "--robot", "nobodys", *FIGURES)
     assert {"dead_band", "wheel_gain", "motor_lag"} <= {effect["name"] for effect in found["effects"]}
     assert {effect["name"] for effect in found["effects"]} <= {"dead_band", "wheel_gain", "motor_lag", "delay"}
     assert found["clocks"]["offset_s"] == pytest.approx(-0.24, abs=0.02)

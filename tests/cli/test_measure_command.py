@@ -52,7 +52,6 @@ def test_repeats_are_labelled_and_one_gives_the_table_of_none_asked_for(measured
 @pytest.mark.parametrize(
     ("name", "options", "says"),
     [
-        ("nowhere/one.csv", (), "its folder does not exist"),
         ("one.csv", ("--seed", "-1"), "--seed must be at least 0"),
         ("one.csv", ("--model", "no.toml"), "proxytune measure: --model no.toml: no such file; check the path\n"),
     ],

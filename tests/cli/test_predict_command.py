@@ -1,5 +1,6 @@
 """`predict` replays any log with a model file and says how far it strays."""
 
+import shutil
 from dataclasses import replace
 
 import hidden_cases as hidden
@@ -105,6 +106,10 @@ BAD = {
     "a horizon of nothing": (["{model}", "{log}", "--horizon", "0"], "--horizon must be a positive number of seconds"),
     "a horizon that is no number": (["{model}", "{log}", "--horizon", "nan"], "--horizon must be a positive number"),
     "an endless horizon": (["{model}", "{log}", "--horizon", "inf"], "--horizon must be a positive number"),
+    "its own model": (["{model}", "{log}", "--output", "{model}"], "is read by this command, and would be lost"),
+    "its own log": (["{model}", "{log}", "--output", "{log}/samples.csv"], "is read by this command"),
+    "its own frames": (["{model}", "{log}", "--frames", "--output", "{log}"], "is read by this command"),
+    "a bag's option for a log": (["{model}", "{log}", "--clock-offset", "5"], "is a log already"),
     "a horizon shorter than a sample": (["{model}", "{log}", "--horizon", "0.01"], "shorter than a sample"),
 }
 
@@ -113,10 +118,23 @@ BAD = {
 def test_bad_input_is_one_line_and_nothing_is_written(words, says, folder, model, tmp_path, refused):
     path = model()
     given = [word.format(home=tmp_path, log=folder, model=path) for word in words]
-    line = refused("predict", *given, "--output", tmp_path / "p.csv")
+    line = refused("predict", *(given if "--output" in given else [*given, "--output", tmp_path / "p.csv"]))
     assert line.startswith("proxytune predict: ")
     assert says in line
     assert not (tmp_path / "p.csv").exists()
+
+
+def test_a_pose_off_the_way_is_left_out_and_another_robots_model_a_caution(folder, model, tmp_path, answered):
+    path = model({"trim": 0.2, "delay": 0.12})
+    good = answered("predict", path, folder, "--output", tmp_path / "poses.csv")
+    shutil.copytree(folder, tmp_path / "off")
+    samples = pd.read_csv(folder / "samples.csv")
+    samples.loc[len(samples) // 2, "x"] += 10.0
+    samples.to_csv(tmp_path / "off" / "samples.csv", index=False)
+    told = answered("predict", path, tmp_path / "off", "--output", tmp_path / "poses.csv")
+    assert told["error"]["value"] == pytest.approx(good["error"]["value"], rel=0.02)
+    (line,) = answered("predict", model(robot="husky"), folder, "--output", tmp_path / "poses.csv")["cautions"][-1:]
+    assert line == "the log is of the robot 'duckiebot', and the model of 'husky'"
 
 
 def test_an_interval_without_its_value_is_a_caution_and_a_camera_no_matter_of_poses(folder, model, tmp_path, answered):

@@ -33,7 +33,7 @@ def recorded(words, answered, tmp_path):
     return run
 
 
-def test_frames_are_read_as_they_were_taken(words, capsys, tmp_path):
+def test_frames_are_read_as_they_were_taken(words, capsys, tmp_path, refused):
     home = tmp_path / "log"
     assert main([*map(str, words("log", "--frames", "12")), "--json"]) == 0
     out, told = capsys.readouterr()
@@ -54,6 +54,8 @@ def test_frames_are_read_as_they_were_taken(words, capsys, tmp_path):
     np.testing.assert_allclose(frames.times, np.concatenate([drive.times for drive in taken]), atol=1e-6)
     np.testing.assert_allclose(log.episodes[-1].poses, taken[-1].episode.poses, atol=1e-4)
     assert not list(home.rglob(".*"))
+    assert "log: holds a log; give another folder" in refused(*words("log"))
+    assert "--frames must be between 0 and 1000000, got -1" in refused(*words("new", "--frames", "-1"))
 
 
 def test_manoeuvres_are_the_same_with_frames_and_odd_intervals_a_caution(words, answered, recorded, tmp_path, capsys):
@@ -64,8 +66,7 @@ def test_manoeuvres_are_the_same_with_frames_and_odd_intervals_a_caution(words, 
     assert "[camera]" not in (plain / "log.toml").read_text()
     assert read_log(plain).frames is None
     assert answered(*words("good"))["cautions"] == []
-    odd = "[effects.trim]\ntrim = { value = 0.2, interval = [0.01, 0.05] }\n"
-    (tmp_path / "model.toml").write_text(MODEL + odd)
+    (tmp_path / "model.toml").write_text(MODEL + "[effects.trim]\ntrim = { value = 0.2, interval = [0.01, 0.05] }\n")
     assert main([*map(str, words("odd"))]) == 0
     assert capsys.readouterr().out.startswith("beware: ")
 

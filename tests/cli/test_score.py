@@ -179,7 +179,7 @@ def test_figures_are_drawn_where_asked(tables):
         (("--proxy", "sim.csv", *SIDES, *METRIC), "given twice"),
         ((*SIDES, "--metric", "distanc:max"), "did you mean 'distance'"),
         ((*SIDES, "--metric", "distance"), "write NAME:max"),
-        ((*SIDES, *METRIC, "--resamples", "3"), "--resamples"),
+        ((*SIDES, *METRIC, "--resamples", "3"), "resamples must be between"),
         ((*SIDES, *METRIC, "--beta", "distance"), "write NAME:WEIGHT"),
         ((*SIDES, *METRIC, "--beta", "distance:1"), "no weight is given for time"),
     ],

@@ -285,8 +285,7 @@ def test_a_study_with_an_effect_of_its_own_is_drawn_without_it(tmp_path, answere
     folder = tmp_path / "study"
     folder.mkdir()
     (folder / "mine.py").write_text(OWN)
-    text = STUDY.format(**{**PLAIN, "jobs": 1}).replace("trim = ", '"mine:Mine" = ')
-    (folder / "study.toml").write_text(text)
+    (folder / "study.toml").write_text(STUDY.format(**{**PLAIN, "jobs": 1}).replace("trim = ", '"mine:Mine" = '))
     (folder / "target.csv").write_text("agent,episode,distance\nsteady,0,1.0\ndaredevil,0,2.0\n")
     found = answered("study", folder)
     (folder / "mine.py").write_text(SIGN.replace("{home!r}", repr(str(folder))))

@@ -32,8 +32,7 @@ def assert_whole(text):
 
 
 def shown(*words):
-    arguments = parser(list(map(str, words))).parse_args(list(map(str, words)))
-    return COMMANDS[words[0]].load()(arguments).text
+    return COMMANDS[words[0]].load()(parser(list(map(str, words))).parse_args(list(map(str, words)))).text
 
 
 @pytest.mark.parametrize("kind", ["robots", "maps", "effects", "agents", "metrics", "engines", "measures"])

@@ -103,8 +103,7 @@ COMMANDS = np.tile((0.2, 0.5), (8, 1))
 
 
 def family(folder, **domain):
-    exactly = {"position_noise_m": 0.0, "heading_noise_deg": 0.0}
-    settings = {"plant": "planar", "seconds": 2.0, **exactly, **domain}
+    settings = {"plant": "planar", "seconds": 2.0, **{"position_noise_m": 0.0, "heading_noise_deg": 0.0}, **domain}
     return lane_following(Section(folder / "study.toml", "domain.", settings), model=None)
 
 

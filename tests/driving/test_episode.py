@@ -564,8 +564,7 @@ def test_each_second_a_wheel_out_of_the_lane_takes_one_and_both_take_two(start, 
 def test_what_is_in_the_lane_counts_by_where_the_wheels_are():
     x, y, heading = moved_left(OUTER, ONE_OUT)
     askew = np.tile((x, y + 0.2, heading + 1.55), (61, 1))
-    straight = np.tile((x, y + 0.2, heading), (61, 1))
-    assert (worth(askew), worth(straight)) == (pytest.approx(1.0), pytest.approx(0.0))
+    assert (worth(askew), worth(np.tile((x, y + 0.2, heading), (61, 1)))) == (pytest.approx(1.0), pytest.approx(0.0))
     wrong = drive(OUTER, OUTER_LAP)[::-1] + (0, 0, pi)
     assert worth(wrong) == pytest.approx(-(len(wrong) - 1) / 60)
     poses = np.array([moved_left(OUTER, BOTH_IN), moved_left(OUTER, BOTH_OUT)])

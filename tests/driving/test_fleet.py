@@ -129,8 +129,7 @@ def test_a_policy_is_asked_only_when_a_picture_is_new_and_a_robot_without_a_came
     room.examine_together(episodes(1), lambda picture: asked.append(picture) or np.full(2, 0.1))
     assert len(asked) == 15
     room = dataclasses.replace(classroom(plant="planar"), robot="irobot_create")
-    alone = complaint_of(room.examine, episodes(1)[0], lean)
-    assert complaint_of(room.examine_together, episodes(2), lean) == alone
+    assert complaint_of(room.examine_together, episodes(2), lean) == complaint_of(room.examine, episodes(1)[0], lean)
 
 
 def lost(picture):

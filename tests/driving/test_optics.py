@@ -137,8 +137,7 @@ def test_a_pixel_shows_the_place_that_it_looks_at(pose):
 
 def test_sky_is_above_the_horizon_nothing_far_from_the_map_and_a_batch_is_as_one_after_another():
     pictures = GroundPlaneCamera(replace(NOMINAL, roll_deg=5.0), FLOOR).render(loop_poses(4))
-    sky = (pictures == SKY).all(axis=-1)
-    assert (sky == np.isnan(ground_points(replace(NOMINAL, roll_deg=5.0))[..., 0])).all()
+    assert ((pictures == SKY).all(axis=-1) == np.isnan(ground_points(replace(NOMINAL, roll_deg=5.0))[..., 0])).all()
     pictures = GroundPlaneCamera(NOMINAL, FLOOR).render(np.array([[30.0, -20.0, 0.3], [-2.0, 0.5, 3.1]]))
     assert np.abs(pictures[:, 14:] - np.array(COLOURS["off_map"], dtype=float)).max() <= 3.0
     camera, poses = GroundPlaneCamera(NOMINAL, FLOOR), loop_poses(7)

@@ -173,8 +173,7 @@ def cover(floor, colour):
     axis = paint - asphalt
     rest = floor.pixels - asphalt
     part = rest @ axis / (axis @ axis)
-    beside = np.abs(rest - part[..., None] * axis).max(axis=-1)
-    return np.where(beside < 3.0, np.clip(part, 0.0, 1.0), 0.0)
+    return np.where(np.abs(rest - part[..., None] * axis).max(axis=-1) < 3.0, np.clip(part, 0.0, 1.0), 0.0)
 
 
 def metres(profile):

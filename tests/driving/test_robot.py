@@ -213,8 +213,7 @@ def test_a_plugin_s_robot_is_read_from_the_folder_that_it_names(tmp_path, monkey
     info.mkdir()
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: wolves\nVersion: 1.0\n")
     (info / "entry_points.txt").write_text("[proxytune]\nrobot.wolf = wolves_of:HOME\nrobot.fox = wolves_of:FOX\n")
-    text = "from pathlib import Path\nHOME = Path(__file__).parent / 'wolf'\nFOX = 3\n"
-    (tmp_path / "wolves_of.py").write_text(text)
+    (tmp_path / "wolves_of.py").write_text("from pathlib import Path\nHOME = Path(__file__).parent / 'wolf'\nFOX = 3\n")
     shutil.copytree(shipped("robots") / "husky", tmp_path / "wolf")
     toml = tmp_path / "wolf" / "robot.toml"
     toml.write_text(toml.read_text(encoding="utf-8").replace('name = "husky"', 'name = "wolf"'), encoding="utf-8")

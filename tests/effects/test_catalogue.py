@@ -39,8 +39,7 @@ ORDER = (
 def wheels(theta, duty):
     """Both wheels' speeds, as shares of full speed, at a steady duty."""
     chain = stage_chain(effects_from(theta, ROBOT.figures), Stage.ACTUATION)
-    memory = chain.begin(FilterContext(60.0, np.zeros(2), ROBOT.figures))
-    return chain.apply(np.full((600, 2), duty), memory)[0][-1]
+    return chain.apply(np.full((600, 2), duty), chain.begin(FilterContext(60.0, np.zeros(2), ROBOT.figures)))[0][-1]
 
 
 def test_effects_come_in_the_order_in_which_the_signal_meets_them():
@@ -100,8 +99,7 @@ def test_an_imbalance_of_nothing_changes_nothing(name, imbalance):
 @pytest.mark.parametrize(("imbalance", "wheel"), [(-1.0, "left"), (1.0, "right")])
 def test_an_imbalance_of_one_leaves_the_other_wheel_alone(name, imbalance, wheel):
     signal, tried = subject(name).signal(1), subject(name)
-    effect = tried.moved(CATALOGUE[name].parameters[1], imbalance)
-    moved = np.abs(tried.filtered(effect, signal) - signal).max(axis=0)
+    moved = np.abs(tried.filtered(tried.moved(CATALOGUE[name].parameters[1], imbalance), signal) - signal).max(axis=0)
     here, there = moved if wheel == "left" else moved[::-1]
     assert here > 0.0
     assert there == 0.0

@@ -38,8 +38,7 @@ EFFECTS.append(pytest.param(effect_of(*COMMAND_GROUPS), id="all"))
 
 def commands(seed, length=90):
     """Held, reversed, ended and begun again."""
-    steps = np.random.default_rng(seed).choice((-0.7, -0.3, 0.0, 0.0, 0.4, 0.9), (length // 9, 2))
-    return np.repeat(steps, 9, axis=0)
+    return np.repeat(np.random.default_rng(seed).choice((-0.7, -0.3, 0.0, 0.0, 0.4, 0.9), (length // 9, 2)), 9, axis=0)
 
 
 def run(effect, signal):

@@ -65,8 +65,7 @@ EFFECTS = [pytest.param(effect_of(group), id=group) for group in MOTION_GROUPS] 
 
 
 def a_signal(seed, length=90):
-    held = np.repeat(np.random.default_rng(seed).uniform(-1.0, 1.0, (length // 3, 3)), 3, axis=0)
-    return held * (0.6, 0.0, 5.0)
+    return np.repeat(np.random.default_rng(seed).uniform(-1.0, 1.0, (length // 3, 3)), 3, axis=0) * (0.6, 0.0, 5.0)
 
 
 def integrate_twists(twists, tick_s, heading):
@@ -178,8 +177,7 @@ def test_curves_add_to_their_wheels_and_fade_and_a_veer_follows_the_heading_it_l
     assert all(later < earlier for earlier, later in pairwise(added))
     names = [effect.name for effect in effects_from({**WHOLE, "floor_slope.x": 0.1, "trim": 0.0}, ROBOT.figures)]
     assert names == ["trim", "floor_slope", "learnt"]
-    turning = Learnt(SEEN, (LearntCurve("heading", "veer_sin", (1.0,), (3.0,)),))
-    moved = run(turning, np.tile((0.4, 0.0, 0.0), (600, 1)))
+    moved = run(Learnt(SEEN, (LearntCurve("heading", "veer_sin", (1.0,), (3.0,)),)), np.tile((0.4, 0.0, 0.0), (600, 1)))
     heading = 0.4 + np.concatenate(((0.0,), np.cumsum(moved[:-1, 2]) / RATE_HZ))
     np.testing.assert_allclose(moved[:, 2], 3.0 * 0.4 * np.sin(heading), atol=1e-12)
     assert heading[-1] == pytest.approx(np.pi, abs=0.01)

@@ -43,8 +43,7 @@ def test_a_robot_finds_its_place_and_heading_by_what_is_known_beforehand():
     np.testing.assert_allclose(moved[:, 0], [0.1] * 3 + [0.05] * 3)
     batch = np.stack((TURNING, TURNING))
     slowed = driven(FloorSlope(0.1, 0.0, 0.0), batch, headings=[[1.0, 1.1, 1.2], [0.0, 0.0, 0.0]])[..., 0]
-    expected = [LOST["some"], [0.0, 0.0, 0.0, 0.5, 1.0, 1.5]]
-    np.testing.assert_allclose(slowed, 0.3 - 0.1 * np.cos(expected), atol=1e-12)
+    np.testing.assert_allclose(slowed, 0.3 - 0.1 * np.cos([LOST["some"], [0.0, 0.0, 0.0, 0.5, 1.0, 1.5]]), atol=1e-12)
 
 
 NOMINAL = {"effective_baseline": 0.16}

@@ -53,8 +53,7 @@ def played(environment, steps=4):
     known = Spaces((), (), "", None, "", "", None, steps, ())
     wrapped = WrappedEnvironment(environment, Actuators((), known, 1), Sensors((), known, None, 1))
     space = Discrete(2)
-    first = wrapped.reset(5, np.random.default_rng(1))
-    play(wrapped, load_agent("zero", None, space, 0), first, space, steps)
+    play(wrapped, load_agent("zero", None, space, 0), wrapped.reset(5, np.random.default_rng(1)), space, steps)
     return wrapped
 
 

@@ -146,8 +146,7 @@ def test_a_map_and_an_effect_of_ones_own_lie_in_the_folder_and_it_is_drawn_with_
     assert env.family.starts == 2
     assert 0.2 <= told["theta"]["mine:Half"] <= 0.4
     assert env.render().shape == (480, 640 + 656, 3)
-    tall = "size = [2.4, 2.4]\nstarts = [[1.2, 0.17, 0.0]]"  # the road fills the lower part
-    (tmp_path / "tall.toml").write_text(OVAL.replace("SIZE", tall))
+    (tmp_path / "tall.toml").write_text(OVAL.replace("SIZE", "size = [2.4, 2.4]\nstarts = [[1.2, 0.17, 0.0]]"))
     env = make(folder=tmp_path, map="tall.toml", render_mode="rgb_array")
     env.reset(seed=0)
     white = (env.render()[:, 640:] > 150).all(axis=-1).any(axis=1)

@@ -107,8 +107,7 @@ class Work:
 
 def test_other_processes_unpickle_what_is_of_a_folder_with_its_own_neighbours(write):
     for name, factor in (("left", 10), ("right", 100)):
-        folder = write(name, works=WORK, helper=f"FACTOR = {factor}\n")
-        work = load("works:Work", kind="work", beside=folder)()
+        work = load("works:Work", kind="work", beside=write(name, works=WORK, helper=f"FACTOR = {factor}\n"))()
         assert pickle.loads(pickle.dumps(work)) == work
         with working(work, [1, 2, 3], jobs=2) as results:
             assert sorted(results) == [factor, 2 * factor, 3 * factor]

@@ -70,8 +70,7 @@ def pose(row):
     """The table of a pose: x, y, heading, or x, y, z and a quaternion."""
     if len(row) == 3:
         return {"position": xyz((row[0], row[1], 0.0)), "orientation": quaternion(row[2])}
-    turn = dict(zip(("x", "y", "z", "w"), map(float, row[3:]), strict=True))
-    return {"position": xyz(row[:3]), "orientation": turn}
+    return {"position": xyz(row[:3]), "orientation": dict(zip(("x", "y", "z", "w"), map(float, row[3:]), strict=True))}
 
 
 def xyz(row):

@@ -24,8 +24,7 @@ def write_csv(folder):
     stamps = [int(stamp) for stamp in np.rint((TIMES - 1.7e9) * 1e9).astype(int) + 1_700_000_000 * 10**9]
     columns = (PLACES[:, 0] * 1e3, PLACES[:, 1] * 1e3, np.degrees(HEADINGS), SPEEDS[:, 0], SPEEDS[:, 1])
     rows = (f"{stamp}," + ",".join(f"{v:.12g}" for v in row) for stamp, *row in zip(stamps, *columns, strict=True))
-    header = "stamp_ns,pos_x_mm,pos_y_mm,yaw_deg,cmd_lin,cmd_ang"
-    (folder / "run1.csv").write_text("\n".join([header, *rows]) + "\n")
+    (folder / "run1.csv").write_text("\n".join(["stamp_ns,pos_x_mm,pos_y_mm,yaw_deg,cmd_lin,cmd_ang", *rows]) + "\n")
     return folder / "run1.csv"
 
 

@@ -42,15 +42,13 @@ class Echo(Walled):
         return Driven(np.random.default_rng(episode.seed).uniform(0, 1, (steps, 2)))
 
     def replay(self, episode: Episode, commands: np.ndarray) -> Seen:
-        theta = {**dict(self.inner.theta), **dict(episode.theta)}
-        trim = theta.get("trim", 0.0)
+        trim = {**dict(self.inner.theta), **dict(episode.theta)}.get("trim", 0.0)
         turned = np.cumsum(commands[:, 1] - commands[:, 0] + 0.2 * trim)
         moved = np.cumsum(0.02 * np.stack([np.cos(turned), np.sin(turned)], axis=1), axis=0)
         poses = np.vstack([np.full((1, 3), float(episode.start)), np.column_stack([moved, turned])])
         # A robot that pulls hard hits something, and its record ends there.
         lasts = 50 if trim >= 0.3 else len(commands)
-        grey = np.full((lasts, 2, 3, 3), round(100 + 100 * trim), dtype=np.uint8)
-        return Seen(poses[: lasts + 1], grey)
+        return Seen(poses[: lasts + 1], np.full((lasts, 2, 3, 3), round(100 + 100 * trim), dtype=np.uint8))
 
 
 def echo(section: Section, *, model: Path | None) -> Echo:

@@ -56,5 +56,4 @@ def _sent(random: np.random.Generator, duties: np.ndarray, seconds: float) -> Se
 
 def _in_force(sent: Sent, times: np.ndarray) -> np.ndarray:
     """The newest command at each time, none before the first."""
-    newest = np.searchsorted(sent.times, times + 1e-9, side="right")
-    return np.concatenate((np.zeros((1, 2)), sent.duties))[newest]
+    return np.concatenate((np.zeros((1, 2)), sent.duties))[np.searchsorted(sent.times, times + 1e-9, side="right")]

@@ -35,8 +35,7 @@ def family(name, shift=0, seconds=(1.0, 1.1, 0.9, 1.0), noise=0.1, fresh=True):
 
 def compared(*families, lessons=None):
     """These families of one study; lessons are of a study with [teaching]."""
-    stop = SimpleNamespace(wall_time_s=60.0)
-    settings = SimpleNamespace(metrics=METRICS, teaching=lessons is not None, stop=stop)
+    settings = SimpleNamespace(metrics=METRICS, teaching=lessons is not None, stop=SimpleNamespace(wall_time_s=60.0))
     return ComparedFamilies(settings, families, lessons or {})
 
 

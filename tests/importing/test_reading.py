@@ -160,8 +160,7 @@ def test_drop_outs_are_counted_apart_from_gaps_and_turning_before_or_after_the_c
     assert one.gaps == 0
     assert one.lost == pytest.approx(4 / 400, abs=1e-4)
 
-    random = np.random.default_rng(1)
-    times = np.arange(2000) * 0.05 + random.normal(0.0, 0.002, 2000)
+    times = np.arange(2000) * 0.05 + np.random.default_rng(1).normal(0.0, 0.002, 2000)
     one = survey(drive(times, np.arange(200) * 0.1))
     assert one.jitter_s == pytest.approx(0.002 * np.sqrt(2.0), rel=0.1)
     (note,) = clock_notes([survey(turning(-0.25)), survey(turning(0.1))])

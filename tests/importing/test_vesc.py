@@ -60,8 +60,7 @@ def test_motor_and_servo_are_read_as_the_speed_and_angle_that_were_asked_for(tmp
 
 
 def test_a_servo_that_is_sent_at_its_own_times_holds_between_them(tmp_path):
-    gains = write_gains(tmp_path / "vesc.yaml")
-    commands = read(tmp_path, *sent(servo=ISSUED + 0.05), gains=gains).drives[0].commands
+    commands = read(tmp_path, *sent(servo=ISSUED + 0.05), gains=write_gains(tmp_path / "vesc.yaml")).drives[0].commands
     assert commands.times == pytest.approx(
         1.7e9 + 0.0503 + np.array([0.0, 0.0497, 0.1, 0.1497, 0.2, 0.2497, 0.3, 0.3497, 0.4]), abs=1e-5
     )

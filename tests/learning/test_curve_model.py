@@ -282,8 +282,7 @@ def test_draws_keep_within_the_scores_there_can_be_and_before_any_learning_nothi
 
 
 def test_mean_curves_go_where_scores_are_and_fall_only_beyond_noise():
-    curves = {"rising": curve(10, 20, 40, 50, 50), "dipping": curve(40, 10, 20, 45, 50)}
-    draws = draw_curves(curves, (-60.0, 60.0))
+    draws = draw_curves({"rising": curve(10, 20, 40, 50, 50), "dipping": curve(40, 10, 20, 45, 50)}, (-60.0, 60.0))
     assert draws.monotone == {"rising": True, "dipping": False}
     assert (np.diff(draws.scores["rising"], axis=1) >= -1e-9).all()
     assert np.mean(draws.scores["dipping"], axis=0).min() < 20.0

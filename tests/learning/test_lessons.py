@@ -266,8 +266,7 @@ def test_a_guided_lesson_shows_what_the_policy_visits_with_the_experts_commands(
     ("room", "policy"), [(Tightrope(Wobbly()), lambda seen: np.full(1, 5.0)), (Schoolroom(Wobbly(), blocked=0.4), None)]
 )
 def test_where_a_learner_falls_at_once_or_the_road_is_left_further_lessons_make_up_for_it(room, policy):
-    samples = collect_samples(room, Distribution({}), count=50, seed=1, lesson_s=1.0, policy=policy)
-    assert len(samples.commands) == 50
+    assert len(collect_samples(room, Distribution({}), count=50, seed=1, lesson_s=1.0, policy=policy).commands) == 50
 
 
 def numbered(first, count):

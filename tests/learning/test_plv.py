@@ -145,8 +145,7 @@ def test_examinations_go_where_they_tell_most_nothing_twice_and_fewer_where_all_
     assert len(chosen) == SPENDING.batch
     # Between 400, where it is far below, and 1600, where it is converged.
     assert np.mean([one.samples > 300 for one in chosen]) > 0.5
-    one_repetition = AdaptiveDesign(SPENDING_GRID, 2, 500)
-    chosen = next_examinations(needs(), list(CURVES), one_repetition)
+    chosen = next_examinations(needs(), list(CURVES), AdaptiveDesign(SPENDING_GRID, 2, 500))
     assert 0 < len(chosen) < 500
     assert {one.repetition for one in chosen} == {0, 1}
 
@@ -158,8 +157,7 @@ def test_a_grid_from_few_samples_on_has_no_place_twice_and_none_before_the_first
     scores = np.array([[np.nan, 1.0, 5.0, 30.0, 50.0], [np.nan, 3.0, 9.0, 35.0, 49.0]])
     taught = LearningCurve(grid, np.where(np.isnan(scores), 0.0, scores + 1.0))
     curves = {"none": LearningCurve(grid, scores), "proxy": taught}
-    found = sample_needs(curves, best_score=60.0, tolerance=5.0, draws=300)
-    chosen = next_examinations(found, list(curves), spending)
+    chosen = next_examinations(sample_needs(curves, best_score=60.0, tolerance=5.0, draws=300), list(curves), spending)
     assert len(set(chosen)) == len(chosen) == spending.batch
     # The crossing lies between 8 and 512
     assert np.mean([one.samples >= 8 for one in chosen]) > 0.5

@@ -24,8 +24,7 @@ def test_without_a_word_nothing_is_taught_a_number_is_one_theta_and_a_pair_is_dr
     plain, other = read(tmp_path), read(tmp_path, proxy_lessons="learner", costs={"label": 2})
     assert (plain.proxy_lessons, plain.target_lessons, plain.costs) == ("expert", "expert", Costs(1.0, 1.0, 0.0))
     assert (other.later_keys, other.costs) == ({"proxy_lessons": "learner"}, Costs(1.0, 1.0, 2.0))
-    proxies = {"nominal": {}, "mixed": {"trim": 0.1, "delay": [0.0, 0.2]}}
-    read_proxies = read(tmp_path, proxies=proxies).proxies
+    read_proxies = read(tmp_path, proxies={"nominal": {}, "mixed": {"trim": 0.1, "delay": [0.0, 0.2]}}).proxies
     assert dict(read_proxies["mixed"].bounds) == {"delay": (0.0, 0.2), "trim": (0.1, 0.1)}
     assert dict(read_proxies["nominal"].bounds) == {}
 

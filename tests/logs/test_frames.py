@@ -45,8 +45,7 @@ def test_frames_have_their_own_times_and_numbers(folder):
 
 
 def test_a_frame_of_a_row_has_the_time_at_which_the_pose_lies_on_the_grid(folder):
-    samples = SAMPLES.replace("a,5.1,", "a,5.12,")
-    log = read_log(folder(None, pictures=range(7), samples=samples))
+    log = read_log(folder(None, pictures=range(7), samples=SAMPLES.replace("a,5.1,", "a,5.12,")))
     assert log.frames.times[1] == log.episodes[0].times[1] == pytest.approx(5.1)
 
 
@@ -186,8 +185,7 @@ def noise(rows, columns, seed=5):
 def test_a_width_that_is_no_multiple_is_averaged_all_the_same(tmp_path_factory, rows, columns):
     path, picture = tmp_path_factory.mktemp("odd") / "0.png", noise(rows, columns)
     Image.fromarray(picture).save(path)
-    frames = Frames((path,), np.zeros(1, dtype=np.int64), np.zeros(1), "small_loop")
-    (small,) = read_pictures(frames, [0])
+    (small,) = read_pictures(Frames((path,), np.zeros(1, dtype=np.int64), np.zeros(1), "small_loop"), [0])
     assert small.shape == (max(1, round(rows * 160 / columns)), 160, 3)
     np.testing.assert_allclose(small.mean(axis=(0, 1)), picture.mean(axis=(0, 1)), atol=2.0)
 

@@ -110,8 +110,7 @@ def test_every_pose_lies_within_a_step_of_its_own_time(seed, by, usual):
     with tempfile.TemporaryDirectory() as home:
         log = read_log(write_files(Path(home), files))
     (episode,) = log.episodes
-    apart = np.abs(episode.times[episode.measured.rows] - episode.measured.times)
-    assert apart.max() <= 1.0 / log.rate_hz + 1e-9
+    assert np.abs(episode.times[episode.measured.rows] - episode.measured.times).max() <= 1.0 / log.rate_hz + 1e-9
     assert (np.diff(episode.measured.rows) > 0).all()
 
 
@@ -119,6 +118,15 @@ def test_minutes_taken_for_seconds_are_refused_with_line_and_remedy(folder):
     times = 3.0 + np.concatenate((np.arange(20) * 0.05, 60.0 + np.arange(20) * 0.05))
     with pytest.raises(LogError, match=r"line 22, column 'time': the rows cover 61 s with 40 rows.*write seconds"):
         read_log(folder(rows(times, circle(times))))
+
+
+@pytest.mark.parametrize(("usual", "said"), [(1e-6, "1e-06 s apart"), (50.0, "50 s apart")])
+def test_times_that_cannot_be_seconds_are_refused_and_poses_at_1300_hz_are_read(folder, usual, said):
+    times = 3.5 + (np.arange(40) - 10) * usual
+    with pytest.raises(LogError, match=f"column 'time': poses are usually {said}; write seconds"):
+        read_log(folder(rows(times, circle(times))))
+    times = 3.5 + (np.arange(40) - 10) / 1300.0
+    assert read_log(folder(rows(times, circle(times)))).rate_hz == pytest.approx(1300.0, rel=0.01)
 
 
 def test_a_single_pose_a_drive_is_refused(folder):

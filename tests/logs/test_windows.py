@@ -83,8 +83,7 @@ def test_what_does_not_go_on_stays_as_it_is(change):
 
 def written(folder, names):
     """A log with stamps that jitter and commands of their own, its rows in episodes of these names (400,)."""
-    drawn = np.random.default_rng(4)
-    times = np.arange(400) / 20.0 + drawn.uniform(-0.005, 0.005, 400)
+    times = np.arange(400) / 20.0 + np.random.default_rng(4).uniform(-0.005, 0.005, 400)
     poses = np.stack((0.3 * times, 0.1 * np.sin(times), 0.1 * np.cos(times)), axis=1)
     shown = {"episode": names, "time": times, **dict(zip(("x", "y", "heading"), poses.T, strict=True))}
     sent = {"episode": names, "time": times - 0.013, "v": 0.3, "omega": 0.1 * np.sin(times - 0.013)}

@@ -67,8 +67,7 @@ def test_what_is_next_follows_from_what_was_found():
     assert "from scores alone: blur 0.05" in told
     assert "trim" not in told
     drive = {"name": "spins", "description": "turns on the spot"}
-    partly = {**DIAGNOSIS, "verdict": "partly explained", "next_manoeuvre": drive}
-    told = following(partly, STUDIED, "model.toml", {})
+    told = following({**DIAGNOSIS, "verdict": "partly explained", "next_manoeuvre": drive}, STUDIED, "model.toml", {})
     assert told == "Log spins (turns on the spot), and close the loop with that log."
     assert following(DIAGNOSIS, STUDIED, "", {}) == "Raise budget from 20 to 40, to get closer."
     misfit = "No θ fits. Next: log drives and run `python -m proxytune diagnose LOG`."

@@ -27,8 +27,7 @@ def closed(tmp_path):
     families = [load_family(settings, path) for path in (None, model)]
     studies = [SimpleNamespace(settings=settings, family=family) for family in families]
     before, after = (SimpleNamespace(theta=THETA, result=SimpleNamespace(study=study)) for study in studies)
-    loop = Loop(settings, families[0], "duckiebot", settings.truth, None, ())
-    return Closed(loop, before, {}, after, None, (), 0)
+    return Closed(Loop(settings, families[0], "duckiebot", settings.truth, None, ()), before, {}, after, None, (), 0)
 
 
 def test_the_start_furthest_from_the_target_is_shown_and_nothing_without_a_twin_or_of_failing_starts(closed):

@@ -219,8 +219,7 @@ def test_every_effect_that_was_added_is_on_top_in_the_order_of_adding_and_rivals
     assert {dot.get_label() for dot in dots(top)} == {"added"}
     rival = next(c for c in candidates(diagnosis.robot, diagnosis.found.declared.theta, ()) if c.effect == "stiction")
     adopted = (replace(diagnosis.found.adopted[0], rivals=(rival,)),)
-    figure = motion_figures(replace(diagnosis, found=replace(diagnosis.found, adopted=adopted)))["ranking"]
-    upper = figure.axes[1]
+    upper = motion_figures(replace(diagnosis, found=replace(diagnosis.found, adopted=adopted)))["ranking"].axes[1]
     pairs = zip([tick.get_text() for tick in upper.get_yticklabels()], dots(upper), strict=True)
     marked = {name.split(" (")[0] for name, dot in pairs if dot.get_label() == "fits as well as one added"}
     assert marked == {"stiction"}

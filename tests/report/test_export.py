@@ -79,8 +79,7 @@ def test_mujocos_camera_stands_and_looks_as_was_found():
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     axes = data.cam_xmat[0].reshape(3, 3)
-    turned = orientation(found.camera)
-    assert np.column_stack((-axes[:, 2], -axes[:, 0], axes[:, 1])) == pytest.approx(turned, abs=1e-6)
+    assert np.column_stack((-axes[:, 2], -axes[:, 0], axes[:, 1])) == pytest.approx(orientation(found.camera), abs=1e-6)
     assert data.cam_xpos[0] == pytest.approx((0.066, 0.0, 0.12))
     assert model.cam_fovy[0] == pytest.approx(80.0)
 

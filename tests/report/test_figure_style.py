@@ -16,8 +16,7 @@ HEAVY = ("pybullet", "skopt", "sklearn", "optuna", "torch", "proxytune.diagnosis
 @pytest.mark.parametrize("module", ["proxytune.report.study.figures", "proxytune.report.sweep"])
 def test_a_figure_loads_no_simulator_no_library_of_models_and_no_diagnosis(module):
     line = f"import sys, {module}; print([name for name in {HEAVY} if name in sys.modules])"
-    done = subprocess.run([sys.executable, "-c", line], capture_output=True, text=True, check=True)
-    assert done.stdout == "[]\n"
+    assert subprocess.run([sys.executable, "-c", line], capture_output=True, text=True, check=True).stdout == "[]\n"
 
 
 def test_a_name_stands_right_of_the_panel_at_the_end_of_its_line_in_its_colour():

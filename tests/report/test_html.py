@@ -209,8 +209,7 @@ def test_a_figure_is_part_of_the_page_its_markers_say_their_values_and_its_names
     page = html_of(replace(VIEW, parts=(Picture("P", drawn(), "C"), Picture("Q", drawn(), "C"))))
     names = re.findall(r' id="([^"]+)"', page)
     assert len(names) == len(set(names))
-    wanted = set(re.findall(r'(?:href="#|url\(#)([^")]+)', page))
-    assert wanted <= set(names)
+    assert set(re.findall(r'(?:href="#|url\(#)([^")]+)', page)) <= set(names)
     page = html_of(replace(VIEW, parts=(Picture("P", drawn("<script>x</script>--><b>", "<i>&"), "C"),)))
     assert "<script" not in page
     assert "<b>" not in page

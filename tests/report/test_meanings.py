@@ -53,8 +53,7 @@ def test_what_was_found_or_declared_is_told_with_name_meaning_size_and_worth_and
     )
     assert findings([BAND, SLIP]) == f"{finding(BAND)}; {finding(SLIP)}"
 
-    doubtful = {**SLIP, "worth": {"2": {"value": 0.0, "interval": [-2.0, 2.0], "unit": "%"}}}
-    assert "without it" not in finding(doubtful)
+    assert "without it" not in finding({**SLIP, "worth": {"2": {"value": 0.0, "interval": [-2.0, 2.0], "unit": "%"}}})
     assert findings([{"name": "dead_band"}, {"name": "trim"}]) == "dead band and trim"
 
     own = {"name": "gone:Wheel", "parameters": {"shrink": {"value": 0.25, "interval": [0.25, 0.25], "unit": "m"}}}

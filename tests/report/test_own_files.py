@@ -13,11 +13,13 @@ from ros_stubs import Ackermann, Stamped, Twist, load_node
 
 from proxytune import CommandFilter, export
 from proxytune.cli.main import main
-from proxytune.driving import drivetrain, link_pose, parse_urdf, read_robot
+from proxytune.driving import drivetrain, link_pose, parse_urdf, read_robot, rotation
 from proxytune.driving.plants import PlanarPlant
 from proxytune.effects import FilterContext, Model, effects_from, model_text
 from proxytune.report.export.instance import IN_WHEELS
 from proxytune.report.export.into import patch
+from proxytune.report.export.urdf import angles_of
+from proxytune.report.export.xml_patch import XmlPatch
 
 HZ = 60.0
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "how-to" / "exporting.md"
@@ -99,8 +101,7 @@ def test_the_filter_moves_the_nominal_simulator_and_only_wheels_and_camera_of_a_
     assert nominal(moved) == pytest.approx(extended(), abs=1e-9)
     body = read_robot("car").body()
     found = instance(CAR, wheel_gain=0.9, steering_offset=0.1)
-    told = complaint_of(patch, found, body, Path("mine.urdf"))
-    assert "--wheels LEFT,RIGHT of axle_left, steer_left" in told
+    assert "--wheels LEFT,RIGHT of axle_left, steer_left" in complaint_of(patch, found, body, Path("mine.urdf"))
     patched = patch(found, body, Path("mine.urdf"), ("axle_left", "axle_right"))
     assert {"wheel_gain", "yaw_scrub"} & patched.has == {"wheel_gain"}
     assert patched.text.count('radius="0.045"') == 4
@@ -185,6 +186,17 @@ def test_a_patched_urdf_or_sdf_has_wheels_and_camera_where_they_were_found(patch
     assert np.degrees(vertical) == pytest.approx(80.0)
 
 
+def test_an_element_without_a_last_tag_gets_its_text_inside_and_a_camera_may_look_straight_down(tmp_path):
+    (tmp_path / "a.sdf").write_text('<sdf><pose/><sensor name="eye" /></sdf>')
+    xml = XmlPatch(tmp_path / "a.sdf")
+    xml.set_text(xml.root.find("pose"), "1 2")
+    xml.add(xml.root.find("sensor"), "<pose>3</pose>")
+    assert xml.text() == '<sdf><pose>1 2</pose><sensor name="eye"><pose>3</pose></sensor></sdf>'
+    for pitch in (-np.pi / 2.0, 0.4, np.pi / 2.0):
+        turned = rotation(0.0, 0.3, 1.1) @ rotation(0.0, -0.3, 0.0) @ rotation(0.2, pitch, 0.7)
+        np.testing.assert_allclose(rotation(*angles_of(turned)), turned, atol=1e-7)
+
+
 @pytest.mark.parametrize(
     ("name", "before", "after", "said"),
     [
@@ -223,7 +235,9 @@ def test_what_would_overwrite_or_misread_the_users_own_is_refused(model, tmp_pat
     assert re.search("is no study's folder; give what was diagnosed, .*found/model.toml", told)
     (tmp_path / "mine.urdf").write_text(URDF)
     told = complaint_of(export, model, tmp_path / "mine.urdf", into=tmp_path / "mine.urdf")
-    assert "give another name, so that yours is kept" in told
+    assert "mine.urdf: is read by this command, and would be lost" in told
+    assert "model.toml: is read by this command" in complaint_of(lambda: export(model, model, to="ros"))
+    assert "--to urf: no such format; did you mean 'urdf'?" in complaint_of(lambda: export(model, "o", to="urf"))
     assert "two finite numbers" in complaint_of(CommandFilter(model, rate_hz=HZ).step, (np.nan, 0.0))
 
 

@@ -19,6 +19,7 @@ from proxytune.report.study.page import search_table, study_view
 from proxytune.report.wording import span
 from proxytune.search import Importance, Trial, learn_theta
 from proxytune.storage import TrialRecord
+from proxytune.study import PRPV
 
 
 def lines(figure):
@@ -153,8 +154,7 @@ def test_the_pair_has_a_point_for_every_trial_open_where_it_was_cut_off_and_its_
     (holes,) = [one for one in pair.collections if one.get_zorder() == 3]
     assert np.allclose(holes.get_offsets(), [(0.25, 0.2)])
     assert [one.get_label() for one in pair.collections].count("stopped early") == 1
-    whole = evaluations_figure(learnt).axes[0]
-    assert "stopped early" not in [one.get_label() for one in whole.collections]
+    assert "stopped early" not in [one.get_label() for one in evaluations_figure(learnt).axes[0].collections]
 
 
 def test_the_shadow_is_the_region_that_slants_where_a_pair_trades_and_one_parameter_is_drawn_alone(learnt):
@@ -174,6 +174,10 @@ def test_the_shadow_is_the_region_that_slants_where_a_pair_trades_and_one_parame
     assert len(profiles_figure(alone).axes) == 1
     axes = evaluations_figure(alone).axes[0]
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("delay [s]", "PRPV [ordered pairs]")
+    other = replace(PRPV, name="grasps", label="grasps won", maximise=True)
+    drawn = evaluations_figure(replace(alone, study=replace(study, objective=other)))
+    assert drawn.axes[0].get_ylabel() == "grasps won"
+    assert [axes.get_title() for axes in drawn.axes[1:] if axes.get_title()] == []
 
 
 @pytest.fixture(scope="module")

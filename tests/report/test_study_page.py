@@ -46,8 +46,7 @@ def test_it_has_every_trial_the_best_theta_and_at_its_foot_how_to_come_by_it_aga
     assert f"{result.best.trial.theta['trim']:.4g}</td>" in text
     assert f'<tr><th scope="row">PRPV</th><td class="number">{result.best.assessment.prpv.value}</td>' in text
     foot = text_of(result).split("<footer>")[1]
-    folder = result.study.settings.folder
-    assert f"python -m proxytune study {folder}</code>" in foot
+    assert f"python -m proxytune study {result.study.settings.folder}</code>" in foot
     assert '<th scope="row">engine</th><td>gp</td>' in foot
     assert re.search(r"Written \d{4}-\d\d-\d\d \d\d:\d\d .*with Python 3\..*numpy \d", foot)
     other = page_html(study_view(result, {}), study_foot(result.study.settings, "plot 'a b' --metric x"))

@@ -150,8 +150,7 @@ def test_how_a_study_came_to_its_end_what_matters_and_what_was_cut_off_and_saved
     under_way = replace(result, stopped="")
     assert study_document(under_way)["stopped"] is None
     assert "ended" not in page.search_table(under_way).rows[0][1]
-    settings = replace(result.study.settings, budget=5)
-    lowered = replace(result, study=replace(result.study, settings=settings))
+    lowered = replace(result, study=replace(result.study, settings=replace(result.study.settings, budget=5)))
     assert page.search_table(lowered).rows[0][1].startswith("7 (budget 5); best: trial ")
     moved = Movement(Interval("trim", -0.3, 0.3), 0.01, "distance", 2.0, 0.5, 12, False)
     flown = replace(result, preflight=Preflight({"trim": 0.0}, (moved,), 144))

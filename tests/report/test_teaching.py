@@ -122,8 +122,7 @@ def test_each_proxy_has_a_panel_of_its_own_in_a_figure_that_fits_a_column():
     for axes, one in zip(panels, LESSONS, strict=True):
         curves = {line.get_label(): line for line in axes.lines}
         assert {"with the proxy", "without a proxy", "converged"} <= curves.keys()
-        mean = drawn.needs.draws.scores[one.name].mean(axis=0)
-        assert list(curves["with the proxy"].get_ydata()) == list(mean)
+        assert list(curves["with the proxy"].get_ydata()) == list(drawn.needs.draws.scores[one.name].mean(axis=0))
         dots = [line for line in axes.lines if line.get_linestyle() == "None"]
         assert sum(len(line.get_ydata()) for line in dots) == 3 * 5 + 3 * 4
         ends = [path.vertices[:, 0].tolist() for bars in axes.collections[2:] for path in bars.get_paths()]

@@ -37,6 +37,11 @@ def test_one_table_of_both_sides_gives_each_its_own_column_as_a_share_and_patter
     assert expanded == ["task_a:max", "task_b:max", "time:min"]
 
 
+def test_a_quoted_decimal_comma_is_one_wherever_it_stands(file):
+    assert means(file('Policy,success\nACT,"61,5 %"\npi0,90 %\n')) == {"ACT": 0.615, "pi0": 0.9}
+    assert means(file({"lift": {"ACT": "61,5 %", "pi0": "90 %"}}, "a.json"), "lift") == {"ACT": 0.615, "pi0": 0.9}
+
+
 @pytest.mark.parametrize("cell", ["120", "-20", "100.5%"])
 def test_a_success_rate_beyond_all_rollouts_is_refused_by_its_line_and_other_percentages_are_not(file, cell):
     with pytest.raises(ScoresError, match="line 2, column 'success': a success rate lies between 0 and 100 %"):
@@ -93,6 +98,10 @@ def test_dictionaries_in_a_python_file_are_read_and_nothing_is_run(file, tmp_pat
         ("a.csv", "policy,success\na,18 of 25\nb,x of 25\n", "line 3, column 'success': must be a finite number"),
         ("a.csv", "policy,success\na,18 of 25\nb,0.5\n", "line 3: has no counts of rollouts, as other lines have"),
         ("a.csv", "policy,success,success se\na,0.5,-1\n", "standard error must be zero or more"),
+        ("a.csv", "policy,success,n\na,0.5," + 5000 * "9" + "\n", "line 2"),
+        ("a.csv", "policy,success,n\na,0.5," + 400 * "9" + "\n", "line 2"),
+        ("a.csv", "policy,success\na," + 5000 * "9" + "/" + 5000 * "9" + "\n", "line 2"),
+        ("a.py", "X = {[1]: 2}", "has none that is written out"),
         ("a.json", "{", "not readable as JSON"),
         ("a.json", '{"pick": 3}', "holds no scores by agent"),
         ("a.json", '{"aggregated": {}}', "aggregates alone"),

@@ -47,8 +47,7 @@ def test_tables_are_built_and_arranged_with_their_names_and_an_unknown_metric_is
     assert table.means[:, 0].tolist() == [2.0, 2.0]
     assert table.driven.tolist() == [[True, True], [True, False]]
     table = ScoreTable.from_episodes({(a, e): {"m": 10.0 * i + e} for i, a in enumerate("AB") for e in (1, 2)})
-    moved = table.arrange(agents=("B", "A"), episodes=("2", "1"))
-    assert moved.values[:, :, 0].tolist() == [[12.0, 11.0], [2.0, 1.0]]
+    assert table.arrange(agents=("B", "A"), episodes=("2", "1")).values[:, :, 0].tolist() == [[12.0, 11.0], [2.0, 1.0]]
     table = ScoreTable.from_episodes({("A", 1): {"m": 1.0}, ("A", 2): {"m": 4.0}, ("B", 1): {"m": 2.0}})
     loose = table.unpaired()
     assert loose.driven.sum(axis=0).tolist() == [1, 1, 1]

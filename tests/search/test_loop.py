@@ -63,8 +63,7 @@ def test_an_engine_that_learns_looks_elsewhere_than_at_what_is_pending(engine):
     """What it draws is the same whatever is pending, so it would propose the same again if it did not mind."""
     inner = make_proposer(engine, 4).inner
     finished = search(make_proposer(engine, 4), 8, seed=5)
-    far = Trial((0.29, -0.29), None, pending=True)
-    there = Trial(inner.propose(SPACE, [*finished, far], 5), None, pending=True)
+    there = Trial(inner.propose(SPACE, [*finished, Trial((0.29, -0.29), None, pending=True)], 5), None, pending=True)
     assert inner.propose(SPACE, [*finished, there], 5) != there.values
 
 

@@ -65,6 +65,5 @@ def test_scikit_optimize_draws_it_after_it_was_written_and_read(tmp_path):
     path = tmp_path / "mine.pkl"
     write_skopt(history(), path)
     found = skopt.load(path)
-    axes = plot_convergence(found, ax=Figure().subplots())
-    np.testing.assert_array_equal(axes.lines[0].get_ydata(), [4.0, 4.0])
+    np.testing.assert_array_equal(plot_convergence(found, ax=Figure().subplots()).lines[0].get_ydata(), [4.0, 4.0])
     assert {"delay", "trim"} <= {one.get_xlabel() for one in plot_evaluations(found).figure.axes}

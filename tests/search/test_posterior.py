@@ -77,8 +77,7 @@ SPREAD = 0.03
 
 def outputs(values, seed):
     """Twelve smooth outputs, rough by a little."""
-    waves = np.sin(AGENTS @ to_unit(SPACE, values))
-    return waves + np.random.default_rng([seed, 7]).normal(0.0, SPREAD, 12)
+    return np.sin(AGENTS @ to_unit(SPACE, values)) + np.random.default_rng([seed, 7]).normal(0.0, SPREAD, 12)
 
 
 def trials_of_misfit(seed, count=16):

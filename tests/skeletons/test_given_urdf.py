@@ -103,8 +103,7 @@ def test_what_is_stated_goes_before_the_urdf_save_for_the_wheels(tmp_path):
     robot = write(tmp_path, skeleton)
     wanted = {"mass": 2.5, "camera_pitch": 10.0, "wheel_radius": 0.033, "wheel_distance": 0.16, "camera_height": 0.11}
     assert {name: robot.figures[name] for name in wanted} == pytest.approx(wanted)
-    lines = skeleton.files["robot.toml"].splitlines()
-    sources = {line.split(" = ")[0]: line for line in lines if " = { value" in line}
+    sources = {line.split(" = ")[0]: line for line in skeleton.files["robot.toml"].splitlines() if " = { value" in line}
     assert "given to" in sources["mass"]
     assert "read from turtle.urdf" in sources["wheel_radius"]
     assert "mass" not in skeleton.notes[0]

@@ -267,8 +267,7 @@ def test_a_journal_that_would_have_another_file_deleted_is_refused(broken_off, w
     """SQLite takes that for the journal of a write to several databases, and deletes it once all is undone."""
     victim = write_file("mine", "precious")
     name = str(victim).encode()
-    numbers = [(1 << 30) // 4096 + 1, len(name), sum(name)]
-    place, length, total = (number.to_bytes(4, "big") for number in numbers)
+    place, length, total = (number.to_bytes(4, "big") for number in [(1 << 30) // 4096 + 1, len(name), sum(name)])
     with (broken_off.parent / "study.db-journal").open("ab") as journal:
         journal.write(place + name + length + total + database.OF_SEVERAL_FILES)
     with pytest.raises(StoreError, match="study.db-journal: names another file"):

@@ -145,7 +145,9 @@ def _other_code(folder, shift):
 def test_other_code_that_plays_the_same_counts(beside, make_study):
     """Twelve episodes of a source of other code are driven again; where they come out alike it counts."""
     _other_code(beside, 0.0)
-    assert run_study(make_study(**LEARNS)).document()["earlier"] == 10
+    report = run_study(make_study(**LEARNS))
+    assert report.document()["earlier"] == 10
+    assert report.spent.unused == 12
 
 
 BAD = {

@@ -156,8 +156,7 @@ class Agents:
 @pytest.mark.parametrize("member", ["run", "record", "drive", "replay", "demonstrate", "guide", "examine"])
 def test_whatever_is_asked_of_an_episode_is_passed_on_by_the_name_that_the_family_knows(member):
     family = UserFamily(Agents(), "sim:make", ALIASES)
-    episode = make_episode({}, agent="good", start=0, seed=1)
-    assert getattr(family, member)(episode, 1.5) == (member, "agent0", 1.5)
+    assert getattr(family, member)(make_episode({}, agent="good", start=0, seed=1), 1.5) == (member, "agent0", 1.5)
 
 
 class Examiner(Wobbly):

@@ -85,15 +85,13 @@ def test_an_agent_that_exits_is_driven_alone_and_told_so(make_study, capsys):
 @pytest.mark.parametrize("kind", ["hides", pytest.param("draws", marks=pytest.mark.slow)])
 def test_an_agent_that_keeps_something_outside_its_memory_is_found_driven_alone_and_named(make_study, capsys, kind):
     journal = make_study().parent / "journal"
-    domain = {"faults": f'["agent2:*:{kind}"]', "journal": f'"{journal}"'}
-    folder = make_study(domain=domain, **FAMILY, **FEW)
+    folder = make_study(domain={"faults": f'["agent2:*:{kind}"]', "journal": f'"{journal}"'}, **FAMILY, **FEW)
     assert main(["study", str(folder)]) == 0
     assert f"note: agent 'agent2' {HIDES}" in " ".join(capsys.readouterr().out.split())
     fleets = driven(journal)
     assert [fleet for fleet in fleets if "agent2" in fleet and len(fleet) > 1] == [["agent2", "agent2"]], "tried once"
     assert max(map(len, fleets)) > 4
-    cautions = document(folder, capsys)["cautions"]
-    assert [HIDES in line and "'agent2'" in line for line in cautions].count(True) == 1
+    assert [HIDES in line and "'agent2'" in line for line in document(folder, capsys)["cautions"]].count(True) == 1
 
 
 @pytest.mark.slow

@@ -84,8 +84,7 @@ def test_ppv_is_an_objective_too(make_study):
 
 @pytest.mark.slow
 def test_no_trial_is_cut_off_by_another_objective_than_prpv(own):
-    result = run(own(cut_off="true", budget="9"))
-    assert {trial.state for trial in result.trials} == {"finished"}
+    assert {trial.state for trial in run(own(cut_off="true", budget="9")).trials} == {"finished"}
 
 
 BAD = {
@@ -164,8 +163,7 @@ def test_the_engine_is_a_fact_unless_there_was_no_choice_and_rules_to_stop_and_o
     assert study_facts(open_study(make_study(stop="{ wall_time_s = 5, no_improvement = 0.1 }"))) == plain
     one = study_facts(open_study(make_study()))
     agents = '["agent5", "agent4", "agent3", "agent2", "agent1", "agent0"]'
-    metrics = '["survival_time:max", "distance:max"]'
-    other = study_facts(open_study(make_study(agents=agents, metrics=metrics)))
+    other = study_facts(open_study(make_study(agents=agents, metrics='["survival_time:max", "distance:max"]')))
     assert one == other
     assert changes(one, other) == []
 

@@ -218,8 +218,7 @@ def test_rules_to_stop_hold_over_all_runs_and_jobs_and_not_without_a_trial(finis
         taken = sum(outcome.seconds for outcomes in known for outcome in outcomes.values())
         assert stopped(StudyRun(ruled(finished, wall_time_s=0.9 * taken), store), trials)
         assert not stopped(StudyRun(ruled(finished, wall_time_s=1.1 * taken), store), trials)
-        twice = changed(finished, stop=StopRules(wall_time_s=0.9 * taken), jobs=2)
-        assert not stopped(StudyRun(twice, store), trials)
+        assert not stopped(StudyRun(changed(finished, stop=StopRules(wall_time_s=0.9 * taken), jobs=2), store), trials)
     failed = [TrialRecord(number, {"trim": 0.0, "delay": 0.0}, "failed") for number in range(1, 7)]
     with Store.read(finished) as store:
         assert stopped(StudyRun(ruled(finished, no_improvement=ALWAYS), store), failed) == ""

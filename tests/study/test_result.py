@@ -272,8 +272,7 @@ def test_the_document_has_the_answer_and_every_candidate_and_the_row_of_the_sear
     assert searched[:2] == ("  in search", str(found.best.assessment.prpv.value))
     assert searched[3].startswith("4 lower by luck")
     unlucky = replace(answer, scores=(int(answer.trial.prpv),))
-    none = replace(found, confirmation=replace(found.confirmation, answer=unlucky))
-    searched = usefulness_table(none).rows[1]
+    searched = usefulness_table(replace(found, confirmation=replace(found.confirmation, answer=unlucky))).rows[1]
     assert searched[3].startswith("no optimism")
 
 

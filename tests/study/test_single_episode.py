@@ -77,8 +77,7 @@ def test_they_part_at_the_first_time_that_is_further_apart_than_the_limit(speed)
 
 
 def test_places_are_compared_at_the_same_time_until_one_has_ended():
-    pair = paired(recorded(lambda time: 0.04 * time), recorded(lambda time: 0.0 * time, seconds=1.0))
-    assert pair.parted_s is None
+    assert paired(recorded(lambda time: 0.04 * time), recorded(lambda time: 0.0 * time, seconds=1.0)).parted_s is None
     fast, slow = recorded(lambda time: 0.5 * time), recorded(lambda time: 0.5 * time)
     thinned = {name: column[::4] for name, column in slow.poses.items()}
     assert paired(fast, type(slow)(slow.metrics, thinned, slow.commands)).parted_s is None

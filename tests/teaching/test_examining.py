@@ -105,7 +105,6 @@ def test_scores_become_curves_over_the_grid_and_what_lies_between():
 def test_fewer_examinations_than_at_first_are_refused_and_a_run_is_known_before_it(make_study):
     with pytest.raises(SettingsError, match=r"teaching\.examinations: must be between 8"):
         read_study_settings(make_taught(make_study, more="examinations = 7"))
-    taught = load_setup(read_study_settings(make_taught(make_study, more=CHOSEN))).settings
-    assert count_examinations(taught, 4) == 56
+    assert count_examinations(load_setup(read_study_settings(make_taught(make_study, more=CHOSEN))).settings, 4) == 56
     whole = load_setup(read_study_settings(make_taught(make_study, called="whole"))).settings
     assert count_examinations(whole, 4) == 4 * 3 * len(GRID)

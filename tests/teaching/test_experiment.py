@@ -86,8 +86,7 @@ def test_every_point_of_a_learning_curve_is_told_with_its_score(make_study):
     found = run_experiment(settings, load_setup(settings), telling)
     assert len(telling.lines) == len(set(telling.lines)) == 4 * 3 * len(GRID)
     assert "none, repetition 1, 0 target samples: nothing learnt yet" in telling.lines
-    last = found.without.scores[2, -1]
-    assert f"none, repetition 3, {GRID[-1]} target samples: score {last:.3g}" in telling.lines
+    assert f"none, repetition 3, {GRID[-1]} target samples: score {found.without.scores[2, -1]:.3g}" in telling.lines
 
 
 @pytest.mark.slow

@@ -208,8 +208,7 @@ def test_the_expert_drives_where_nothing_has_been_learnt_and_the_learner_ever_af
     made = staged(tmp_path, target_lessons="learner")
     for count, kind in ((20, first), (71, "guided"), (160, "guided")):
         samples(made, count, proxy)
-        journal = (tmp_path / "journal").read_text().splitlines()
-        assert {line.split()[0] for line in journal} == {kind}
+        assert {line.split()[0] for line in (tmp_path / "journal").read_text().splitlines()} == {kind}
         (tmp_path / "journal").unlink()
 
 

@@ -58,8 +58,7 @@ def test_there_is_one_theta_without_widths_beside_the_one_that_prpv_chooses_if_t
 @pytest.mark.slow
 def test_finalists_are_taught_with_lessons_and_examinations_that_the_search_has_not_used(make_study, tmp_path):
     journal = tmp_path / "journal"
-    folder = make_taught(make_study, domain={"teaching_journal": f'"{journal}"'}, **BOX_KEYS)
-    settings = read_study_settings(folder)
+    settings = read_study_settings(make_taught(make_study, domain={"teaching_journal": f'"{journal}"'}, **BOX_KEYS))
     setup = load_setup(settings)
     right, wrong = {"delay": (0.21, 0.21), "trim": (0.12, 0.12)}, {"trim": (-0.3, -0.3)}
     named = {"right": Distribution(right), "wrong": Distribution(wrong)}
@@ -121,8 +120,7 @@ def test_a_raised_budget_goes_on_after_the_very_same_trials(make_study, tmp_path
     assert len(journal.read_text().splitlines()) == driven
     path = folder / "study.toml"
     path.write_text(path.read_text().replace("budget = 3", "budget = 4"))
-    longer = run(folder)
-    thetas = [[dict(trial.theta) for trial in found.trials] for found in (short, again, longer)]
+    thetas = [[dict(trial.theta) for trial in found.trials] for found in (short, again, run(folder))]
     assert thetas[0] == thetas[1] == thetas[2][:3]
     assert len(thetas[2]) == 4
 
@@ -224,6 +222,5 @@ def test_widths_without_a_parameter_or_plv_without_a_target_are_refused(make_stu
 def test_a_width_beyond_the_parameters_box_is_one_line(make_study, widest, wide):
     settings = read_study_settings(make_taught(make_study, parameters={"trim": "[0.1, 0.3]"}))
     path, says = settings.path, f"must be at most 0.2, all of its box in [parameters], got {wide}"
-    told = complaint_of(search_space, settings, {"trim": (0.0, widest)}, {})
-    assert told == f"{path}: teaching.width.trim: {says}"
+    assert complaint_of(search_space, settings, {"trim": (0.0, widest)}, {}) == f"{path}: teaching.width.trim: {says}"
     assert search_space(settings, {"trim": (0.0, 0.2)}, {}).names == ("trim", "trim width")

@@ -330,8 +330,8 @@ def gather_views(log: Log, frames: Frames, robot: Robot) -> Gathered:
     robot.camera_figures()  # Refuses a robot without a camera before anything is read
     road = read_road(frames.road)
     tracks, numbers = track_frames(log, frames)
-    most = min(len(numbers), MOST_FRAMES)
-    used = np.unique(np.linspace(0, len(numbers) - 1, most).round().astype(np.intp))
+    known = len(numbers)
+    used = np.unique(np.linspace(0, known - 1, min(known, MOST_FRAMES)).round().astype(np.intp))
     tracks = replace(tracks, instants=tracks.instants[used], begins=tracks.begins[used])
     numbers = numbers[used]
     pictures, swapped = in_rgb(read_pictures(frames, numbers.tolist()))
@@ -347,7 +347,8 @@ def gather_views(log: Log, frames: Frames, robot: Robot) -> Gathered:
     heading_rad = tracks.share * np.radians(heading_deg)
     views = Views(edges, tracks, Markings(road), optics, position_m, float(heading_rad), road.paint.tape_m)
     count, every = len(numbers), len(frames.paths)
-    notes = [f"{count} of {every} frames are used, evenly spread: more tell no more"] if count < every else []
+    notes = [f"{every - known} of {every} frames have no pose at their time and are left out"] if known < every else []
+    notes += [f"{count} of {known} frames are used, evenly spread: more tell no more"] if count < known else []
     return Gathered(views, numbers, pictures, frames, (*notes, *((SWAPPED,) if swapped else ())))
 
 

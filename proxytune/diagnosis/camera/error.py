@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from proxytune.arrays import Flags, Floats
+from proxytune.arrays import NORMAL_95, Flags, Floats
 from proxytune.diagnosis.answer import Estimate
 from proxytune.diagnosis.camera.appearance import floor_pixels
 from proxytune.diagnosis.camera.edges import Gathered, Views, effects_of
@@ -81,10 +81,6 @@ def error_over(sums: Floats, counts: Floats, seed: int) -> PictureError:
     with np.errstate(invalid="ignore", divide="ignore"):
         frames = np.where(counts > 0, sums / counts, np.nan)
     return PictureError(float(sums.sum() / max(counts.sum(), 1.0)), (float(low), float(high)), frames)
-
-
-TWO_SIDED = 1.96
-"""Standard deviations on either side of a 95 % interval."""
 
 
 @dataclass(frozen=True)
@@ -158,7 +154,7 @@ class CameraDiagnosis:
 
 def estimate_of(value: float, sd: float, unit: str) -> Estimate:
     """A value with this standard deviation as an estimate with its 95 % interval."""
-    return Estimate(float(value), (float(value - TWO_SIDED * sd), float(value + TWO_SIDED * sd)), unit)
+    return Estimate(float(value), (float(value - NORMAL_95 * sd), float(value + NORMAL_95 * sd)), unit)
 
 
 Look = Mapping[str, float]

@@ -15,6 +15,7 @@ from typing import Any, Generic, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
+from scipy.signal import lfilter
 
 from proxytune.diagnosis.answer import RULES, Rules
 from proxytune.driving import Robot, is_robot, read_robot, robot_from_geometry, robot_names
@@ -298,6 +299,12 @@ class Drives:
         parts = {name: getattr(self, name)[episodes] for name in ("duties", "issued", "rest", "headings")}
         wheels = None if self.wheels is None else self.wheels[episodes]
         return replace(rest, **parts, wheels=wheels, episode=np.searchsorted(episodes, rest.episode))
+
+
+def lagged(signal: Floats, ticks: float) -> Floats:
+    """Signals (episodes, ticks, …) after a first-order lag of so many ticks, steady before they begin."""
+    kept = float(np.exp(-1.0 / ticks)) if ticks > 0.0 else 0.0
+    return np.asarray(lfilter([1.0 - kept], [1.0, -kept], signal, axis=1, zi=kept * signal[:, :1])[0])
 
 
 def relative(origin: Floats, pose: Floats) -> Floats:

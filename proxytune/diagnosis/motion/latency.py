@@ -17,9 +17,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from scipy.optimize import minimize
-from scipy.signal import lfilter
 
-from proxytune.diagnosis.motion.drives import Drives, Floats, Whole, relative, rows_at, sum_by
+from proxytune.diagnosis.motion.drives import Drives, Floats, Whole, lagged, relative, rows_at, sum_by
 from proxytune.driving import drivetrain
 from proxytune.logs import Log
 
@@ -162,18 +161,15 @@ class _CommandedSpeeds:
         given, figures = self.drives.duties[episodes], self.drives.robot.figures
         before = np.repeat(self.drives.rest[episodes, None], self.pad, axis=1)
         duties = np.concatenate((before, given, np.repeat(given[:, -1:], self.pad, axis=1)), axis=1)
-        wheels = self._lagged(duties, lags_s[0])
+        of_wheels, of_turning = (lag_s * self.drives.tick_hz if lag_s > 1e-4 else 0.0 for lag_s in lags_s)
+        wheels = lagged(duties, of_wheels)
         if self.drives.robot.drive == "ackermann":
             twists = drivetrain(self.drives.robot, ()).ideal(wheels)[..., ::2]
         else:
             yaw = (wheels[..., 1] - wheels[..., 0]) / figures["effective_baseline"]
             twists = figures["full_speed"] * np.stack((wheels.mean(axis=-1), yaw), axis=-1)
-        twists[..., 1:] = self._lagged(twists[..., 1:], lags_s[1])
+        twists[..., 1:] = lagged(twists[..., 1:], of_turning)
         return np.concatenate((np.zeros_like(twists[:, :1]), np.cumsum(twists, axis=1)), axis=1)
-
-    def _lagged(self, signal: Floats, lag_s: float) -> Floats:
-        kept = float(np.exp(-1.0 / (lag_s * self.drives.tick_hz))) if lag_s > 1e-4 else 0.0
-        return lfilter([1.0 - kept], [1.0, -kept], signal, axis=1, zi=kept * signal[:, :1])[0]
 
     def reactions(self, speeds: Speeds, latencies_s: Sequence[float], lags_s: tuple[float, float]) -> list[Reaction]:
         """The reaction with the best gains at each latency."""
@@ -304,8 +300,7 @@ def clock_drift(blocks: Blocks, times: Floats, latencies: Floats) -> Drift | Non
     steps = round(FASTEST_DRIFT_S / DRIFT_STEP_S)
     rates = np.arange(-steps, steps + 1) * 2.0 * DRIFT_STEP_S / span
     left = [_put_later(blocks.squares, latencies, rate * middle).sum(axis=0).min() for rate in rates]
-    rate, curve = float(rates[int(np.argmin(left))]), 0.0
-    slopes = np.zeros(len(times))
+    rate = float(rates[int(np.argmin(left))])
     for _ in range(DRIFT_ITERATIONS):
         squares = _put_later(blocks.squares, latencies, rate * middle)
         total = squares.sum(axis=0)

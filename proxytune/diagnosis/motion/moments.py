@@ -41,7 +41,8 @@ def find_period(drives: Drives, theta: Theta) -> Period | None:
     """Find the period of what a model leaves over along the way, None where there is none."""
     asked = increments(drives, theta)[:, 0]
     times = (drives.first + drives.last) / 2.0 / drives.tick_hz
-    seconds = float(np.median(np.bincount(drives.episode, drives.last - drives.first))) / drives.tick_hz
+    driven = np.bincount(drives.episode, drives.last - drives.first)
+    seconds = float(np.median(driven[driven > 0])) / drives.tick_hz
     lowest = max(LOWEST_HZ, FEWEST / seconds)
     lines = np.arange(lowest, HARMONICS * HIGHEST_HZ, 0.25 / seconds)
     if len(lines) < 2 * ROUND:

@@ -54,8 +54,7 @@ class Responses(NamedTuple):
 class RandomEffect(NamedTuple):
     """A random effect weighed."""
 
-    effect: str
-    parameter: str
+    effect: str  # its name, which is that of its only parameter too
     value: float  # its likeliest size
     interval: tuple[float, float]  # all sizes that are looked for, until `infer_size_indirectly` narrows it
     gain: float  # beyond what chance gives on average [nats]
@@ -83,7 +82,7 @@ def _weigh(effect: str, draws: Draws, rate_hz: float, answered: Responses) -> Ra
     chance = np.max([_ratio(draws, rate_hz, size, others, energy) for size in _grid(draws)], axis=0)
     p_value = float((1 + (chance >= gain).sum()) / (1 + len(chance)))
     left = _left(draws.lateness(best, rate_hz), answered.gradient, answered.size)
-    return RandomEffect(effect, effect, best, draws.sizes, gain - max(0.0, float(chance.mean())), p_value, left)
+    return RandomEffect(effect, best, draws.sizes, gain - max(0.0, float(chance.mean())), p_value, left)
 
 
 def _left(late: Lateness, gradient: Floats, energy: Floats) -> float:
@@ -229,8 +228,8 @@ def _invert(sizes: Floats, likeliest: Floats, measured: float) -> Sequence[float
 def _simulate_innovations(model: Fit, effect: RandomEffect, size: float, seed: int) -> Floats:
     """Innovations of the model on drives with the effect and with noise, as loud as those measured (3N,)."""
     drives = model.drives
-    late = lateness({effect.parameter: size}, drives.rate_hz)
-    theta = {**model.theta, effect.parameter: size, "delay": max(0.0, model.theta["delay"] - late)}
+    late = lateness({effect.effect: size}, drives.rate_hz)
+    theta = {**model.theta, effect.effect: size, "delay": max(0.0, model.theta["delay"] - late)}
     drawn = increments_along(drives, drawn_paths(drives, theta, seed)) - increments(drives, model.theta)
     struck = model.whiten.whiten(drawn)
     noise = np.random.default_rng(seed).standard_normal(len(struck))

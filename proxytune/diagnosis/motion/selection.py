@@ -320,7 +320,7 @@ def _fitted(model: Fit, effect: FittedCandidate | RandomEffect) -> FittedCandida
 
 def fit_random(model: Fit, effect: RandomEffect) -> FittedCandidate:
     """Fit the model with an effect that draws."""
-    theta = {**model.theta, effect.parameter: effect.value}
+    theta = {**model.theta, effect.effect: effect.value}
     # The delay gives up the mean lateness of the draws, which it had to stand for without the effect.
     late = lateness(theta, model.drives.rate_hz) - lateness(model.theta, model.drives.rate_hz)
     theta["delay"] = max(0.0, model.theta["delay"] - late)
@@ -345,8 +345,8 @@ def _compare_predictions(one: Fit, other: Fit) -> Ratio | None:
     windows = cut(drives, drives.rules.guard_horizon_s)
     if len(windows.begin) < 2:
         return None
-    squares = [pose_errors(fitted.drives, fitted.theta, windows)[:, 0] ** 2 for fitted in (one, other)]
-    return ratio(squares[0], squares[1], blocks_of(drives, windows))
+    own, others = (pose_errors(fitted.drives, fitted.theta, windows)[:, 0] ** 2 for fitted in (one, other))
+    return ratio(own, others, blocks_of(drives, windows), drives.rules.ratio_p_value)
 
 
 def adopt(adopted: list[AdoptedEffect], best: FittedCandidate, evidence: Evidence) -> list[AdoptedEffect]:
@@ -355,8 +355,8 @@ def adopt(adopted: list[AdoptedEffect], best: FittedCandidate, evidence: Evidenc
         rules = best.fitted.drives.rules
         least = min(draw.gain - rules.rival_nats, rules.rival_share * draw.gain)
         close = [other for other in evidence.random if other.effect != draw.effect and other.gain > least]
-        rivals = tuple(Candidate(one.effect, "", ((one.parameter,),), {}, (0.0,), ((one.value,),)) for one in close)
-        own = (draw.parameter,)
+        rivals = tuple(Candidate(one.effect, "", ((one.effect,),), {}, (0.0,), ((one.value,),)) for one in close)
+        own = (draw.effect,)
         return [*adopted, AdoptedEffect(draw.effect, "", own, (), draw.gain, draw.p_value, rivals, draw.interval)]
     assert best.screened is not None
     form = best.screened.candidate

@@ -13,9 +13,8 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from scipy.signal import lfilter
 
-from proxytune.diagnosis.motion.drives import Drives, Floats
+from proxytune.diagnosis.motion.drives import Drives, Floats, lagged
 from proxytune.diagnosis.motion.fitting import (
     Fit,
     derivatives_by_block,
@@ -158,7 +157,7 @@ def _transients(motion: _Motion) -> _Signal:
     parts = []
     for side in range(2):
         command = motion.commands[..., side]
-        slow = [_smooth(command, seconds * rate) for seconds in (0.05, 0.15, 0.45, 1.2)]
+        slow = [lagged(command, seconds * rate) for seconds in (0.05, 0.15, 0.45, 1.2)]
         parts.append(np.stack([command - slow[0]] + [a - b for a, b in pairwise(slow)], axis=-1))
     full = motion.drives.robot.figures["full_speed"]
     signal = parts[0].sum(axis=-1)
@@ -167,11 +166,6 @@ def _transients(motion: _Motion) -> _Signal:
     else:
         twists = _of_wheels(motion, *(p * full for p in parts))
     return Cue.TRANSIENTS, signal, "duty", twists
-
-
-def _smooth(signal: Floats, ticks: float) -> Floats:
-    kept = np.exp(-1.0 / ticks)
-    return np.asarray(lfilter([1.0 - kept], [1.0, -kept], signal, axis=-1, zi=kept * signal[:, :1])[0])
 
 
 def _after_reversal(motion: _Motion) -> _Signal:

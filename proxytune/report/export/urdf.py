@@ -1,10 +1,12 @@
 """A robot's URDF with what was found of its wheels, its camera and the tracked point."""
 
 import math
+import warnings
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from proxytune import driving
 from proxytune.arrays import Floats
@@ -91,8 +93,10 @@ def end_of(joint: ET.Element, end: str) -> str:
 
 def angles_of(turned: Floats) -> tuple[float, float, float]:
     """Roll, pitch and yaw of a rotation (3, 3) [rad]."""
-    pitch = math.asin(max(-1.0, min(1.0, -turned[2, 0])))
-    return math.atan2(turned[2, 1], turned[2, 2]), pitch, math.atan2(turned[1, 0], turned[0, 0])
+    with warnings.catch_warnings():
+        # Straight up or down, roll and yaw are one angle: it takes that for the one and 0 for the other, and warns
+        warnings.simplefilter("ignore", UserWarning)
+        return tuple(Rotation.from_matrix(turned).as_euler("xyz").tolist())
 
 
 def _numbers(values: Iterable[float]) -> str:

@@ -75,15 +75,23 @@ class XmlPatch:
             self._changes.append((begin + found.start(), begin + found.end(), ""))
 
     def set_text(self, element: ET.Element, text: str) -> None:
-        """Give an element that has a first and a last tag another text."""
+        """Give an element another text."""
         _, opened, end = self._places[element]
-        self._changes.append((opened, end, escape(text)))
+        self._write(element, (opened, end), escape(text))
 
     def add(self, parent: ET.Element, text: str) -> None:
         """Write an element first of all in a parent that has others, indented as these."""
         opened = self._places[parent].opened
         inner = re.match(rb"\s*", self._bytes[opened:])
-        self._changes.append((opened, opened, (inner.group().decode() if inner else "") + text))
+        self._write(parent, (opened, opened), (inner.group().decode() if inner else "") + text)
+
+    def _write(self, element: ET.Element, place: tuple[int, int], text: str) -> None:
+        """Put a text between an element's tags; one that has no last tag gets it."""
+        begin, opened, _ = self._places[element]
+        empty = re.search(rb"\s*/>$", self._bytes[begin:opened])
+        if empty:
+            place, text = (begin + empty.start(), opened), f">{text}</{element.tag}>"
+        self._changes.append((*place, text))
 
     def text(self) -> str:
         """The file with all changes."""

@@ -28,11 +28,10 @@ def convergence_figure(result: StudyResult) -> Figure:
     answers = [(trial.number, result.value_of(answer)) for trial, answer in pairs if answer is not None]
     # Where fresh episodes chose another answer in the end, the line ends at that one's.
     ends = [*answers, (result.trials[-1].number + 1, result.value_of(result.best.trial))]
-    label = result.study.objective.label
+    label = _label(result)
     named = [style.LineName("answer\nso far", style.VERMILLION, ends[-1][1] or 0.0)]
     axes.step(*zip(*ends, strict=True), where="post", color=style.VERMILLION, linewidth=1.5, label=named[0].words)
     if result.study.objective == PRPV:
-        label = "PRPV [ordered pairs]"
         fresh, nominal = result.expected, result.nominal.expected if result.nominal else None
         told = [(ends[-1][0], fresh, style.VERMILLION, "D", "answer, fresh episodes")] if fresh else []
         told += [(0, nominal, "black", "s", "simulator as it is")] if nominal else []
@@ -52,6 +51,11 @@ def convergence_figure(result: StudyResult) -> Figure:
     style.name_lines(axes, named, TWO_LINES)
     style.legend_below(figure, axes, without=[name.words for name in named])
     return figure
+
+
+def _label(result: StudyResult) -> str:
+    objective = result.study.objective
+    return "PRPV [ordered pairs]" if objective == PRPV else objective.label
 
 
 def _draw_trials(axes: Axes, result: StudyResult) -> None:
@@ -142,36 +146,40 @@ MARKS = {"answer": (style.VERMILLION, "o", 8.0, "none"), "truth": ("black", "v",
 
 
 def evaluations_figure(result: StudyResult) -> Figure:
-    """Draw where the trials went, a panel a pair, on the 95 % region's shadow; of one parameter PRPV over its range."""
+    """Draw where the trials went, a panel a pair, on the 95 % region's shadow; of one parameter its scores."""
     count = len(result.study.settings.space.intervals)
     cells = max(1, count - 1)
     columns = max(2, cells)
     width = max(style.COLUMN, PANEL * columns + 0.5)
     figure = Figure(figsize=(width, 0.9 * width * cells / columns + 0.25), layout="constrained")
     grid = figure.add_gridspec(cells, columns)
-    scores = [trial.score for trial in result.trials if trial.score is not None]
+    objective = result.study.objective
+    label = _label(result)
+    scores = [objective.sign * trial.score for trial in result.trials if trial.score is not None]
     norm = Normalize(min(scores), max(scores))
     pairs = [(column, row) for row in range(1, count) for column in range(row)]
     for column, row in pairs:
         _pair(figure.add_subplot(grid[row - 1, column]), result, (column, row), norm)
-    if not pairs:  # PRPV over the range of a single parameter, on its 95 % interval
+    if not pairs:  # The objective over the range of a single parameter, on its 95 % interval
         axes, (box,) = figure.add_subplot(grid[0, 0]), result.study.settings.space.intervals
         look: dict[str, Any] = {"color": style.LIGHT_BLUE, "alpha": 0.35, "linewidth": 0, "label": REGION}
         axes.axvspan(*result.knowledge.intervals[box.name], **look)
-        points = np.array([[trial.theta[box.name], trial.score or 0.0] for trial in result.trials])
+        points = np.array([[trial.theta[box.name], objective.sign * (trial.score or 0.0)] for trial in result.trials])
         _scatter_trials(axes, result, points, norm)
-        _mark(axes, [result.best.trial.theta[box.name], result.best.assessment.prpv.value], "answer")
-        if result.truth is not None and box.name in result.truth:
+        _mark(axes, [result.best.trial.theta[box.name], result.value_of(result.best.trial) or 0.0], "answer")
+        if objective == PRPV and result.truth is not None and box.name in result.truth:
             _mark(axes, [result.truth[box.name], 0.0], "truth")
         axes.set_xlim(box.low, box.high)
-        style.dress(axes, with_unit(box.name, result.study.family.parameters[box.name].unit), "PRPV [ordered pairs]")
-    floor = "" if result.floor.value is None else f"\n{style.floor_name(result.floor)} {result.floor.value:.1f}"
-    # The colours of PRPV and what the marks are stand in the corner that the pairs leave free.
+        style.dress(axes, with_unit(box.name, result.study.family.parameters[box.name].unit), label)
+    floor = ""
+    if objective == PRPV and result.floor.value is not None:
+        floor = f"\n{style.floor_name(result.floor)} {result.floor.value:.1f}"
+    # The colours of the objective and what the marks are stand in the corner that the pairs leave free.
     panels, key = figure.axes[: len(pairs) or 1], figure.add_subplot(grid[0, 1:])
     key.set_axis_off()
     place = key.inset_axes((0.15, 0.8, 0.8, 0.08))
     bar = figure.colorbar(ScalarMappable(norm, style.SHADES), cax=place, orientation="horizontal")
-    bar.ax.set_title(f"PRPV [ordered pairs]{floor}", fontsize=7)
+    bar.ax.set_title(f"{label}{floor}", fontsize=7)
     bar.ax.tick_params(labelsize=7)
     named = style.named_handles(panels)
     look = {"loc": "upper center", "fontsize": 7, "frameon": False}
@@ -211,7 +219,7 @@ def _pair(axes: Axes, result: StudyResult, places: tuple[int, int], norm: Normal
 
 def _scatter_trials(axes: Axes, result: StudyResult, points: Floats, norm: Normalize) -> None:
     scored = np.array([trial.score is not None for trial in result.trials])
-    scores = [trial.score for trial in result.trials if trial.score is not None]
+    scores = [result.study.objective.sign * trial.score for trial in result.trials if trial.score is not None]
     across, up = points[scored].T
     axes.scatter(across, up, c=scores, cmap=style.SHADES, norm=norm, s=14, linewidths=0, clip_on=False, zorder=2)
     cut = np.array([trial.state == "cut" for trial in result.trials])
@@ -250,7 +258,7 @@ def _shadow(axes: Axes, result: StudyResult, places: tuple[int, int]) -> None:
 
 
 def importance_figure(result: StudyResult) -> Figure:
-    """Draw each parameter's share in PRPV's variance over the box, most important first, with its 95 % interval."""
+    """Draw each parameter's share in the objective's variance over the box with its 95 % interval, largest first."""
     ordered = sorted(result.importances, key=lambda one: one.share)
     figure, axes = style.one_panel(1.1 + 0.25 * len(ordered))
     places = np.arange(len(ordered))
@@ -263,7 +271,7 @@ def importance_figure(result: StudyResult) -> Figure:
     axes.set_xlim(0.0, 1.0)
     axes.set_ylim(-0.6, len(ordered) - 0.4)
     axes.xaxis.set_major_formatter(PercentFormatter(1.0, symbol=" %"))
-    style.dress(axes, "share in the variance of PRPV over the box")
+    style.dress(axes, f"share in the variance of {result.study.objective.label} over the box")
     style.legend_below(figure, axes)
     return figure
 

@@ -180,7 +180,7 @@ def search_table(result: StudyResult, spent: str = "") -> Table:
         rows.append(("stopped early", f"{trials}; saved {episodes} episodes ({seconds:.3g} s)"))
     ordered = sorted(result.importances, key=lambda one: -one.share)
     shares = [f"{one.name} {one.share:.2f} ({one.interval[0]:.2f} to {one.interval[1]:.2f})" for one in ordered]
-    rows.append(("Sobol index", f"total, of PRPV over the box: {', '.join(shares)}"))
+    rows.append(("Sobol index", f"total, of {result.study.objective.label} over the box: {', '.join(shares)}"))
     if result.failed_episodes:
         failed = sum(trial.state == "failed" for trial in result.trials)
         lost = f", and with them {failed} of {count} trials" if failed else ""

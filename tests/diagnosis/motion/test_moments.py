@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from planted import CALM, TRUTH, planted_drives
+from planted import CALM, TRUTH, drives_of, planted_drives, planted_log
 
 from proxytune.diagnosis.motion.drives import Drives
 from proxytune.diagnosis.motion.moments import find_period
@@ -26,6 +26,14 @@ def behind(drives: Drives, period, stands) -> Drives:
 
 def test_nothing_is_found_where_nothing_comes_again(drives):
     assert find_period(drives, TRUTH) is None
+
+
+def test_drives_without_two_poses_do_not_count():
+    log = planted_log(TRUTH, episodes=6, seconds=40.0, noise=CALM)
+    gone = [
+        replace(one, poses=np.where(np.arange(len(one.poses))[:, None] > 0, np.nan, one.poses)) for one in log.episodes
+    ]
+    assert find_period(drives_of(replace(log, episodes=(*log.episodes[:2], *gone[2:]))), TRUTH) is None
 
 
 @pytest.mark.parametrize(("period", "stands"), [(4.0, 0.3), (2.5, 0.2)])

@@ -210,8 +210,7 @@ def test_the_change_per_weight_is_that_of_replays(drives, extra, named):
     assert sorted(order) == sorted(weights)
     none = dict.fromkeys(weights, 0.0)
     for column, name in enumerate(order):
-        moved = slopes_of(drives, {**theta, **extra, **none, name: SIZE}, offered)
-        seen = (still.residuals - moved.residuals) / SIZE
+        seen = (still.residuals - slopes_of(drives, {**theta, **extra, **none, name: SIZE}, offered).residuals) / SIZE
         np.testing.assert_allclose(still.columns[..., column], seen, rtol=0, atol=2e-3 * np.abs(seen).max() + 1e-6)
 
 
@@ -259,8 +258,7 @@ def test_windows_cover_every_increment_once_but_for_short_ends(long, horizon_s):
 def test_a_horizon_that_does_not_divide_a_drive_leaves_no_stub(long, horizon_s):
     windows = cut(long, horizon_s)
     for window, begin in enumerate(windows.begin):
-        own = windows.increment[windows.window == window]
-        lasts = (long.last[own[-1]] - long.first[begin]) / long.tick_hz
+        lasts = (long.last[windows.increment[windows.window == window][-1]] - long.first[begin]) / long.tick_hz
         assert lasts >= 0.9 * horizon_s - 1e-9
 
 
@@ -284,8 +282,7 @@ def test_intervals_cover_the_true_error_about_as_often_as_they_say():
     blocks = np.repeat(np.arange(12), 20)
     covered = 0
     for _ in range(200):
-        size = np.repeat(random.gamma(4.0, 0.25, 12), 20)
-        low, high = rmse(random.chisquare(1, 240) * size, blocks).interval
+        low, high = rmse(random.chisquare(1, 240) * np.repeat(random.gamma(4.0, 0.25, 12), 20), blocks).interval
         covered += low <= 1.0 <= high
     assert 170 <= covered <= 199
 

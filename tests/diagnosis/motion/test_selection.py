@@ -78,7 +78,7 @@ def test_a_rival_has_most_of_the_evidence_nearly_all_if_it_predicts_worse_or_mov
 
 @pytest.mark.parametrize(("gain", "expected"), [(50.0, []), (80.0, ["delay_jitter"])])
 def test_a_random_effect_has_the_other_as_rival_by_most_of_the_evidence(drives, gain, expected):
-    lost, late = (RandomEffect(name, name, 0.1, (0.05, 0.2), nats, 0.01) for name, nats in
+    lost, late = (RandomEffect(name, 0.1, (0.05, 0.2), nats, 0.01) for name, nats in
                   (("dropped_commands", 100.0), ("delay_jitter", gain)))  # fmt: skip
     choice = FittedCandidate(100.0, evaluate(drives, TRUTH, DECLARED, NOISE), random=lost)
     (adopted,) = adopt([], choice, Evidence([], {}, (lost, late), []))
@@ -140,8 +140,7 @@ def test_what_chance_gains_once_in_a_hundred_logs_or_predicts_worse_is_not_chose
 
 @pytest.mark.parametrize(("gain", "p_value"), [(500.0, 0.02), (25.0, 0.01)])
 def test_a_random_effect_needs_as_small_a_chance_and_twice_the_evidence(drives, gain, p_value):
-    lost = RandomEffect("dropped_commands", "dropped_commands", 0.1, (0.05, 0.2), gain, p_value)
-    assert chosen(drives, random=(lost,)) is None
+    assert chosen(drives, random=(RandomEffect("dropped_commands", 0.1, (0.05, 0.2), gain, p_value),)) is None
 
 
 @pytest.mark.parametrize(("gain", "wanted"), [(85.0, "dead_band"), (40.0, "dead_band (left wheel)")])
@@ -317,7 +316,7 @@ def test_a_curve_goes_beyond_names_by_a_fifth_and_thirty_nats(gain, best, beyond
 
 def test_an_effect_is_listed_by_its_full_fit_where_it_has_one_and_random_effects_among_them():
     fitted, other = screened_with("yaw_scrub", 20.0), screened_with("turn_slip", 50.0, 0.3)
-    lost = RandomEffect("dropped_commands", "dropped_commands", 0.1, (0.0, 1.0), 60.0, 0.01)
+    lost = RandomEffect("dropped_commands", 0.1, (0.0, 1.0), 60.0, 0.01)
     evidence = Evidence([other, fitted], {"yaw_scrub": FittedCandidate(80.0, None, fitted)}, (lost,), [])
     listed = [(one.effect, one.gain, one.p_value) for one in list_tried(evidence)]
     assert listed == [("yaw_scrub", 80.0, 0.002), ("dropped_commands", 60.0, 0.01), ("turn_slip", 50.0, 0.3)]
@@ -328,7 +327,7 @@ def test_an_effect_is_listed_by_its_full_fit_where_it_has_one_and_random_effects
 )
 def test_no_random_effect_stands_for_what_a_car_lacks_beside_it(monkeypatch, drive, left, chosen):
     """True ones leave up to 1.7 of what pulls commands. Robots on two wheels are judged as they always were."""
-    lost = RandomEffect("dropped_commands", "dropped_commands", 0.5, (0.0, 0.6), 2000.0, 0.01, left)
+    lost = RandomEffect("dropped_commands", 0.5, (0.0, 0.6), 2000.0, 0.01, left)
     model = SimpleNamespace(drives=SimpleNamespace(rules=RULES, robot=SimpleNamespace(drive=drive)))
     monkeypatch.setattr(selection, "fit_random", lambda model, one: FittedCandidate(one.gain, model, random=one))
     monkeypatch.setattr(selection, "predicts_no_worse", lambda one, other: True)

@@ -125,8 +125,7 @@ def on_a_floor(mujoco, urdf):
     for geom in (one for body in spec.bodies for one in body.geoms if one.name == "skid"):
         geom.condim, geom.priority = 1, 1
     for joint in ("my_left_joint", "my_right_joint"):
-        motor = spec.add_actuator(name=joint, target=joint, trntype=mujoco.mjtTrn.mjTRN_JOINT)
-        motor.set_to_velocity(kv=0.05)
+        spec.add_actuator(name=joint, target=joint, trntype=mujoco.mjtTrn.mjTRN_JOINT).set_to_velocity(kv=0.05)
     return spec.compile()
 
 

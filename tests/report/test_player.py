@@ -44,5 +44,4 @@ def test_two_wheels_are_told_velocities_and_their_own_commands_and_then_to_stop(
 def test_a_car_is_told_speed_and_steering_angle(tmp_path, monkeypatch, kind):
     player = played(tmp_path, monkeypatch, "car", kind)
     told = [(one.drive.speed, one.drive.steering_angle) for one in player.told["drive"]]
-    expected = [*commands_as("speed_steering", read_robot("car"), DUTIES), (0.0, 0.0)]
-    np.testing.assert_allclose(told, expected, rtol=1e-4)
+    np.testing.assert_allclose(told, [*commands_as("speed_steering", read_robot("car"), DUTIES), (0.0, 0.0)], rtol=1e-4)

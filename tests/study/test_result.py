@@ -265,8 +265,7 @@ def test_the_document_has_the_answer_and_every_candidate_and_the_row_of_the_sear
         one.trial.number or None for one in found.confirmation.candidates
     ]
     lucky = replace(answer, scores=(int(answer.trial.prpv) + 4,))
-    luck = replace(found, confirmation=replace(found.confirmation, answer=lucky))
-    fresh, searched = usefulness_table(luck).rows[:2]
+    fresh, searched = usefulness_table(replace(found, confirmation=replace(found.confirmation, answer=lucky))).rows[:2]
     assert fresh[:2] == ("PRPV", f"{found.expected.prpv.value.value:.0f}")
     assert "; expected, in " in fresh[3]
     assert searched[:2] == ("  in search", str(found.best.assessment.prpv.value))

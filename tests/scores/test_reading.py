@@ -90,7 +90,7 @@ def test_what_cannot_be_written_leaves_nothing_behind_and_else_bytes_and_values_
     table = read_scores(csv(GOOD), ["distance"])
     (tmp_path / "folder").mkdir()
     with pytest.raises(ScoresError, match="cannot be written"):
-        write_scores(table, tmp_path / "none" / "x.csv")
+        write_scores(table, tmp_path / "scores.csv" / "x.csv")
     with pytest.raises(ScoresError, match="cannot be written"):
         write_scores(table, tmp_path / "folder")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["folder", "scores.csv"]

@@ -16,12 +16,12 @@ import shutil
 import tempfile
 import time
 import tomllib
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from string import Template
 from typing import Any
 
-from proxytune.errors import InputError, ProxytuneError, SettingsError
+from proxytune.errors import InputError, ProxytuneError, RunError, SettingsError
 
 
 def check_place(path: Path, *, folder: bool = False, ours: bool = False, inputs: Iterable[str | Path] = ()) -> None:
@@ -138,14 +138,20 @@ NEW_S = 60.0
 """So long after it was made [s] a temporary folder may not be locked yet."""
 
 
-def write_or_refuse(path: Path, text: str, kind: type[ProxytuneError]) -> None:
-    """Write a text whole, its folder made where missing, or leave the old file and raise an error of this kind."""
+def write_whole(
+    path: Path, write: Callable[[Path], object] | str, *, what: str = "", kind: type[ProxytuneError] = RunError
+) -> None:
+    """Write a text, or have a draft written, and put it in the file's place once it is whole; its folder is made.
+
+    Raises:
+        ProxytuneError: Of this kind, if it cannot be written; after the path it has `what` that is, with a space.
+    """
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with draft_of(path) as draft:
-            draft.write_text(text, encoding="utf-8", newline="")
+            draft.write_text(write, encoding="utf-8", newline="\n") if isinstance(write, str) else write(draft)
     except OSError as problem:
-        raise kind(f"{path}: cannot be written ({problem.strerror}); make room and run again") from None
+        raise kind(f"{path}: {what}cannot be written ({problem.strerror}); fix that and run again") from None
 
 
 @contextlib.contextmanager

@@ -273,6 +273,17 @@ def pairs_in(option: str, text: str, shape: str) -> dict[str, str]:
     return pairs
 
 
+def numbers_in(option: str, text: str, shape: str) -> dict[str, float]:
+    """Numbers by name of an option, one at least; other than these it is refused as pairs are."""
+    try:
+        numbers = {name: float(value) for name, value in pairs_in(option, text, shape).items()}
+    except ValueError:
+        numbers = {}
+    if not numbers:
+        raise InputError(f"{option} {text}: write {shape}")
+    return numbers
+
+
 def table_text(path: Path, kind: type[InputError], *, missing: str = "check the path", no_text: str = NO_CSV) -> str:
     """The text of a table; whatever keeps it from being read is a complaint of this kind, in one line."""
     try:

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from one_line import complaint_of
 
-from proxytune.settings import Section, nearest, pairs_in, read_settings, read_text
+from proxytune.settings import Section, nearest, numbers_in, pairs_in, read_settings, read_text
 
 
 def section(path, **values):
@@ -75,6 +75,7 @@ def test_a_file_that_is_not_toml_is_one_line(tmp_path, content, says):
 def test_a_file_is_looked_for_beside_the_nearest_name_suggested_and_long_rows_are_no_long_keys(tmp_path):
     assert "cannot be read" in complaint_of(read_settings, tmp_path)
     assert pairs_in("--at", " a = 1, b=2,", "NAME=VALUE") == {"a": "1", "b": "2"}
+    assert complaint_of(numbers_in, "--at", " ", "NAME=VALUE") == "--at  : write NAME=VALUE"
     assert complaint_of(pairs_in, "--at", "a=1,a=2", "NAME=VALUE") == "--at a=1,a=2: names 'a' twice; give each once"
     section = Section(Path("/some/study.toml"), "", {"target": "../target.csv"})
     assert section.file("target") == Path("/some/../target.csv")

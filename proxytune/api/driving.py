@@ -12,7 +12,7 @@ from proxytune.effects import SHIPPED, Catalogue, read_model
 from proxytune.errors import InputError
 from proxytune.report import frame_html
 from proxytune.seeds import episode_seed
-from proxytune.settings import pairs_in
+from proxytune.settings import numbers_in
 from proxytune.space import Theta
 from proxytune.storage import FILE_NAME as DATABASE
 from proxytune.sweep import best_theta, has_answer
@@ -110,8 +110,4 @@ def read_theta(text: str | None, catalogue: Catalogue = SHIPPED, option: str = "
         return {}
     if text.endswith(".toml"):
         return read_model(Path(text), catalogue).theta
-    shape = "NAME=VALUE,NAME=VALUE, best, nominal or a model.toml"
-    try:
-        return {name: float(value) for name, value in pairs_in(option, text, shape).items()}
-    except ValueError:
-        raise InputError(f"{option} {text}: write {shape}") from None
+    return numbers_in(option, text, "NAME=VALUE,NAME=VALUE, best, nominal or a model.toml")

@@ -15,7 +15,7 @@ from proxytune.api.study import read_study
 from proxytune.effects import Catalogue, FilterContext, effect_of
 from proxytune.errors import InputError
 from proxytune.extensions import is_ours
-from proxytune.files import check_place
+from proxytune.files import check_place, write_whole
 from proxytune.search import History, write_optuna, write_skopt
 from proxytune.settings import figure_cautions, nearest
 from proxytune.space import Theta
@@ -137,7 +137,7 @@ def _export_trials(folder: Path, output: Path, to: str) -> ExportReport:
         if output.exists() and not filecmp.cmp(output, draft, shallow=False):
             raise InputError(f"{output}: is there already; give another name, or move it away")
 
-    report.write_whole(output, "", write)
+    write_whole(output, write)
     return ExportReport(output, to, (), {"name": history.name, "trials": len(history.trials)})
 
 

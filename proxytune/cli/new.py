@@ -11,7 +11,7 @@ from proxytune.cli.terminal import Answer
 from proxytune.driving import is_robot, read_robot
 from proxytune.errors import InputError, RunError
 from proxytune.files import folder_draft_of
-from proxytune.settings import pairs_in
+from proxytune.settings import numbers_in
 from proxytune.skeletons import Skeleton, family_skeleton, robot_from_urdf, robot_skeleton, study_skeleton
 
 NARROW = 76
@@ -45,15 +45,9 @@ def pasteable(command: str) -> str:
     return f"  {before} \\\n      --{options}"
 
 
-SHAPE = "NAME=VALUE,NAME=VALUE with numbers"
-
-
 def read_figures(text: str | None) -> dict[str, float]:
     """Figures from NAME=VALUE pairs."""
-    try:
-        return {name: float(value) for name, value in pairs_in("--figures", text or "", SHAPE).items()}
-    except ValueError:
-        raise InputError(f"--figures {text}: write {SHAPE}") from None
+    return numbers_in("--figures", text, "NAME=VALUE,NAME=VALUE with numbers") if text else {}
 
 
 def _check(arguments: argparse.Namespace) -> None:

@@ -24,7 +24,7 @@ import proxytune
 from proxytune.diagnosis.answer import Progress
 from proxytune.driving import Robot
 from proxytune.errors import RunError
-from proxytune.files import draft_of
+from proxytune.files import write_whole
 from proxytune.identity import digest, meaning_of, meaning_of_code, versions_of
 
 Result = TypeVar("Result")
@@ -95,12 +95,8 @@ class Stages:
             self._report(f"{path}: is damaged; it is made again")
         result, written = make(), io.BytesIO()
         _Writer(written, self._known).dump(result)
-        try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            with draft_of(path) as draft:
-                draft.write_bytes(_digest_of(written.getvalue()) + b"\n" + written.getvalue())
-        except OSError as problem:
-            raise RunError(f"{path}: cannot be written ({problem.strerror}); fix that and run again") from None
+        content = written.getvalue()
+        write_whole(path, lambda draft: draft.write_bytes(_digest_of(content) + b"\n" + content))
         return result
 
 

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from proxytune.arrays import Floats
 from proxytune.domain import Classroom, Demonstration, Episode, OnPolicyClassroom, Policy, make_episode
 from proxytune.errors import EpisodeError, InputError, LearnerError, StoreError
-from proxytune.files import draft_of
+from proxytune.files import write_whole
 from proxytune.identity import digest, meaning_of
 from proxytune.learning.learner import Learner
 from proxytune.lineage import named
@@ -165,12 +165,11 @@ def _text(facts: Mapping[str, Any]) -> str:
 
 
 def _write(path: Path, arrays: Arrays) -> None:
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with draft_of(path) as draft, draft.open("wb") as file:
+    def write(draft: Path) -> None:
+        with draft.open("wb") as file:
             np.savez_compressed(file, allow_pickle=False, **arrays)
-    except OSError as problem:
-        raise StoreError(f"{path}: cannot be written ({problem.strerror}); make room and run again") from None
+
+    write_whole(path, write, kind=StoreError)
 
 
 def _read(path: Path) -> Arrays:

@@ -103,7 +103,9 @@ def _axes(drives: list[Chords]) -> Iterator[str]:
     """Tell where the robot moves in a mirror: x or y reversed, or exchanged, and headings not."""
     names = ("speed", "course", "heading")
     speed, course, heading = (np.concatenate([getattr(one, name) for one in drives]) for name in names)
-    moves = speed >= max(MOVES * float(np.quantile(speed, 0.9)), 1e-9) if len(speed) >= ENOUGH else np.array([False])
+    if len(speed) < ENOUGH:
+        return
+    moves = speed >= max(MOVES * float(np.quantile(speed, 0.9)), 1e-9)
     if not moves.any():
         return
     course, heading = course[moves], heading[moves]

@@ -145,5 +145,4 @@ from .writing import (
     svg_of as svg_of,
     write_picture as write_picture,
     write_text as write_text,
-    write_whole as write_whole,
 )

@@ -4,7 +4,7 @@ import contextlib
 import html
 import re
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextvars import ContextVar
 from functools import partial
 from io import BytesIO
@@ -22,8 +22,7 @@ from matplotlib.ticker import FixedFormatter
 from numpy.typing import NDArray
 from PIL import Image
 
-from proxytune.errors import RunError
-from proxytune.files import draft_of, fill_template, package_table
+from proxytune.files import fill_template, package_table, write_whole
 from proxytune.report.view import Drawn, Picture
 
 UNDATED: dict[str, dict[str, Any]] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
@@ -48,14 +47,14 @@ def figures_also_as(formats: Sequence[str]) -> Iterator[None]:
 
 def write_text(path: Path, text: str) -> None:
     """Write a text file, its folder made where missing; an interrupted write leaves the old file."""
-    write_whole(path, "", lambda draft: draft.write_text(text, encoding="utf-8", newline="\n"))
+    write_whole(path, text)
 
 
 def save_figure(figure: Figure, path: Path) -> None:
     """Write a figure as PNG, and in the formats of `figures_also_as`; an interrupted write leaves the old file."""
-    write_whole(path, "the figure ", lambda draft: _save_as(figure, draft, format="png", dpi=200))
+    write_whole(path, lambda draft: _save_as(figure, draft, format="png", dpi=200), what="the figure ")
     for form in _beside.get():
-        write_whole(path.with_suffix(f".{form}"), "the figure ", partial(_draw, figure, form))
+        write_whole(path.with_suffix(f".{form}"), partial(_draw, figure, form), what="the figure ")
 
 
 def save_figures(figures: Mapping[str, Figure], folder: Path) -> list[Path]:
@@ -148,17 +147,4 @@ def file_names(names: Iterable[str]) -> dict[str, str]:
 
 def write_picture(path: Path, picture: NDArray[np.uint8]) -> None:
     """Write a picture (rows, columns, 3) as PNG, its folder made where missing; an interrupted write leaves the old."""
-    write_whole(path, "the picture ", lambda draft: Image.fromarray(picture).save(draft, format="png"))
-
-
-def write_whole(path: Path, what: str, write: Callable[[Path], object]) -> None:
-    """Have a draft written, its folder made where missing, and put it in the file's place once it is whole.
-
-    A complaint has `what` it is, with a space at its end, after the path.
-    """
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with draft_of(path) as draft:
-            write(draft)
-    except OSError as problem:
-        raise RunError(f"{path}: {what}cannot be written ({problem.strerror}); fix that and run again") from None
+    write_whole(path, lambda draft: Image.fromarray(picture).save(draft, format="png"), what="the picture ")

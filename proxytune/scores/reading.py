@@ -16,7 +16,7 @@ import numpy as np
 
 from proxytune.arrays import Floats
 from proxytune.errors import ScoresError
-from proxytune.files import csv_text, write_or_refuse
+from proxytune.files import csv_text, write_whole
 from proxytune.scores import forms
 from proxytune.scores.table import LARGEST, ScoreTable
 from proxytune.settings import NO_CSV, nearest, table_text
@@ -364,4 +364,4 @@ def write_scores(table: ScoreTable, path: Path) -> None:
     """Write a table as CSV, the same bytes for the same table; an interrupted write leaves the old file."""
     driven = np.argwhere(table.driven)
     rows = ([table.agents[row], table.episodes[at], *map(repr, table.values[row, at].tolist())] for row, at in driven)
-    write_or_refuse(path, csv_text(["agent", "episode", *table.metrics], rows), ScoresError)
+    write_whole(path, csv_text(["agent", "episode", *table.metrics], rows), kind=ScoresError)

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from proxytune.arrays import Floats
+from proxytune.arrays import NORMAL_95, Floats
 from proxytune.domain import Episode, Outcome, instance_of
 from proxytune.errors import EpisodeError
 from proxytune.scores import ScoreTable
@@ -292,7 +292,7 @@ def _answer(driven: Sequence[Finalist], learnt: Knowledge, again: Knowledge) -> 
 def _repetitions(run: StudyRun, answer: Finalist, driven: Sequence[Finalist]) -> list[list[Episode]]:
     """The repetitions of the answer that nothing was chosen by: as many as make its interval narrow."""
     settings, table = run.settings, _table(run.study, answer.fresh[0])
-    reach = 1.96 * _expect(run, [table], _donors(run, driven)).deviation if table else np.inf
+    reach = NORMAL_95 * _expect(run, [table], _donors(run, driven)).deviation if table else np.inf
     count = int(np.clip(np.ceil((reach / NARROW) ** 2), 1, MOST_REPETITIONS))
     seeds = [fresh_seed(settings.seed, settings.confirm + 1 + number) for number in range(count)]
     return [plan_episodes(settings, answer.trial.theta, seed) for seed in seeds]

@@ -20,7 +20,7 @@ import numpy as np
 
 from proxytune.domain import Episode, Instance, instance_of
 from proxytune.errors import InputError, StoreError
-from proxytune.files import shipped, temporary_folder, write_or_refuse
+from proxytune.files import shipped, temporary_folder, write_whole
 from proxytune.search import Trial
 from proxytune.seeds import episode_seed
 from proxytune.settings import is_finite, read_text
@@ -259,7 +259,7 @@ def write_table(run: StudyRun) -> Path:
     }
     table = {"format": FORMAT, "facts": dict(source.facts), "metrics": metrics, "agents": list(agents), "trials": rows}
     table["placement"] = placement
-    write_or_refuse(path, json.dumps(table, separators=(",", ":"), allow_nan=False) + "\n", StoreError)
+    write_whole(path, json.dumps(table, separators=(",", ":"), allow_nan=False) + "\n", kind=StoreError)
     return path
 
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from proxytune.arrays import Floats
 from proxytune.errors import StoreError
-from proxytune.files import write_or_refuse
+from proxytune.files import write_whole
 from proxytune.learning import LearningEstimate
 from proxytune.scores import ScoreTable
 from proxytune.seeds import fresh_seed
@@ -166,7 +166,7 @@ def save_lessons(settings: StudySettings, lessons: Mapping[str, Lesson]) -> None
         StoreError: If it cannot be written.
     """
     text = json.dumps({name: asdict(one) for name, one in lessons.items()}, indent=2, allow_nan=False) + "\n"
-    write_or_refuse(_file(settings), text, StoreError)
+    write_whole(_file(settings), text, kind=StoreError)
 
 
 def read_lessons(settings: StudySettings) -> dict[str, Lesson]:

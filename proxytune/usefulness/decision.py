@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from proxytune.arrays import Floats
+from proxytune.arrays import NORMAL_95, Floats
 from proxytune.errors import InputError
 from proxytune.scores import ROUNDING, ScoreTable
 from proxytune.settings import nearest
@@ -197,7 +197,7 @@ def decide(inputs: Comparison, asked: Asked, saving: Saving | None = None, seed:
         },
         best_probabilities=dict(zip(agents, map(float, best), strict=True)),
         not_told_apart=tuple(agents[row] for row in held if row != place),
-        least_told=float(1.96 * np.sqrt(2.0) * np.median(spread)),
+        least_told=float(NORMAL_95 * np.sqrt(2.0) * np.median(spread)),
         basis=basis,
         scores={agent: (float(middle[row]), ends[row]) for row, agent in enumerate(agents)},
         draws=draws,

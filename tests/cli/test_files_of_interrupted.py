@@ -21,14 +21,14 @@ def ctrl_c(monkeypatch):
     real, begun = writing.write_whole, []
 
     def at(number):
-        def write_whole(path, what, write):
+        def write_whole(path, write, **how):
             begun.append(path)
 
             def half(draft):
                 draft.write_bytes(b"half")
                 signal.raise_signal(signal.SIGINT)
 
-            real(path, what, half if len(begun) == number else write)
+            real(path, half if len(begun) == number else write, **how)
 
         monkeypatch.setattr(writing, "write_whole", write_whole)
 

@@ -19,6 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from proxytune.arrays import NORMAL_95
 from proxytune.diagnosis.motion import latency
 from proxytune.diagnosis.motion.drives import Drives, Floats, gather, number_of
 from proxytune.diagnosis.motion.latency import Jump
@@ -127,7 +128,7 @@ def read_clocks(log: Log, robot: Robot, like: Clocks | None = None) -> Clocks:
     assumed = like.left_s if like else max(robot.theta.get("delay", 0.0), ASSUMED_DELAY_S)
     least_apart = max(latency.LEAST_APART_S, latency.SURE * usual.deviation)
     unlike = like is not None and abs(usual.value - assumed) > least_apart
-    half = 1.96 * usual.deviation
+    half = NORMAL_95 * usual.deviation
     early = usual.value + half < 0.0 and usual.value < -EARLIEST_S
     # No delay accounts for such a latency.
     impossible = early or usual.value - half > PARAMETERS["delay"].high
@@ -196,7 +197,7 @@ def _reach(drives: Drives) -> float:
 
 
 def _offset(known: latency.Latency, besides: float) -> Offset:
-    middle, half = known.value - besides, min(1.96 * known.deviation, FURTHEST_S)
+    middle, half = known.value - besides, min(NORMAL_95 * known.deviation, FURTHEST_S)
     return Offset(middle, (middle - half, middle + half))
 
 

@@ -26,6 +26,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from proxytune.arrays import NORMAL_95
 from proxytune.diagnosis.motion.drives import Drives, Floats
 from proxytune.diagnosis.motion.evidence import AdoptedEffect, Findings, Variant
 from proxytune.diagnosis.motion.fitting import Fit, fit_theta, intervals, loss_of, slopes
@@ -260,7 +261,7 @@ class Unknown:
         self._forms = tuple(own.values())
         known = intervals(model)
         ranges = [(span(coordinate, model.drives), known[coordinate[0]]) for coordinate in model.free]
-        self._deviations = np.array([(most - least) / 3.92 / (high - low) for (low, high), (least, most) in ranges])
+        self._deviations = np.array([(b - a) / (2.0 * NORMAL_95) / (high - low) for (low, high), (a, b) in ranges])
 
     def worth(self, commands: Floats) -> Floats:
         """The information of a minute of drives of these commands (E, rows, 2), each (E,)."""

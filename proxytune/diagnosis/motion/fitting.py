@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import least_squares
 
+from proxytune.arrays import NORMAL_95
 from proxytune.diagnosis.motion.drives import Drives, Floats, sum_by
 from proxytune.diagnosis.motion.innovations import (
     FIRST_GUESS,
@@ -210,7 +211,7 @@ def sandwich_intervals(
     found: dict[str, tuple[float, float]] = {}
     for coordinate, variance in zip(free, np.diag(spread), strict=True):
         low, high = span(coordinate, drives)
-        half = 1.96 * float(np.sqrt(variance)) * (high - low)
+        half = NORMAL_95 * float(np.sqrt(variance)) * (high - low)
         found |= {name: (max(low, theta[name] - half), min(high, theta[name] + half)) for name in coordinate}
     return found
 

@@ -21,11 +21,11 @@ from PIL import Image
 
 from proxytune.arrays import Floats
 from proxytune.errors import InputError, RunError
-from proxytune.files import check_place
+from proxytune.files import check_place, write_whole
 from proxytune.report import figure_style as style
 from proxytune.report.drive.figure import COLOURS, draw_map, draw_start, episode_figure
 from proxytune.report.wording import plain
-from proxytune.report.writing import save_figure, write_whole
+from proxytune.report.writing import save_figure
 from proxytune.running import Bars, Watcher
 from proxytune.study import RecordedEpisode, SideBySide
 
@@ -203,7 +203,7 @@ def write_gif(path: Path, frames: Iterable[Frame], samples: Sequence[Frame], fra
     pictures = (Image.fromarray(frame).quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames)
     first = next(pictures)
     how = {"save_all": True, "append_images": pictures, "duration": round(1000.0 / frame_hz), "loop": 0}
-    write_whole(path, "the animation ", lambda draft: first.save(draft, format="GIF", optimize=True, **how))
+    write_whole(path, lambda draft: first.save(draft, format="GIF", optimize=True, **how), what="the animation ")
 
 
 def find_ffmpeg() -> str:
@@ -224,7 +224,7 @@ def write_mp4(path: Path, frames: Iterable[Frame], frame_hz: float) -> None:
     log.setLevel(logging.ERROR)  # What ffmpeg said is said in one line
     try:
         with matplotlib.rc_context({"animation.ffmpeg_path": find_ffmpeg()}):
-            write_whole(path, "the animation ", lambda draft: _encode(draft, iter(frames), frame_hz))
+            write_whole(path, lambda draft: _encode(draft, iter(frames), frame_hz), what="the animation ")
     except subprocess.CalledProcessError as problem:
         said = f"{problem.stderr}".strip().splitlines()[-1:] or [f"exit status {problem.returncode}"]
         raise RunError(f"{path}: ffmpeg cannot encode it ({said[0]}); write a .gif instead") from None

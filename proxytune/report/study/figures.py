@@ -58,6 +58,11 @@ def _label(result: StudyResult) -> str:
     return "PRPV [ordered pairs]" if objective == PRPV else objective.label
 
 
+def _scores(result: StudyResult) -> list[float]:
+    """The objective of every trial that has one; of those cut off it is an estimate."""
+    return [result.study.objective.sign * trial.score for trial in result.trials if trial.score is not None]
+
+
 def _draw_trials(axes: Axes, result: StudyResult) -> None:
     scored = [(trial.number, value) for trial in result.trials if (value := result.value_of(trial)) is not None]
     failed = [trial.number for trial in result.trials if trial.state == "failed"]
@@ -155,7 +160,7 @@ def evaluations_figure(result: StudyResult) -> Figure:
     grid = figure.add_gridspec(cells, columns)
     objective = result.study.objective
     label = _label(result)
-    scores = [objective.sign * trial.score for trial in result.trials if trial.score is not None]
+    scores = _scores(result)
     norm = Normalize(min(scores), max(scores))
     pairs = [(column, row) for row in range(1, count) for column in range(row)]
     for column, row in pairs:
@@ -219,8 +224,7 @@ def _pair(axes: Axes, result: StudyResult, places: tuple[int, int], norm: Normal
 
 def _scatter_trials(axes: Axes, result: StudyResult, points: Floats, norm: Normalize) -> None:
     scored = np.array([trial.score is not None for trial in result.trials])
-    scores = [result.study.objective.sign * trial.score for trial in result.trials if trial.score is not None]
-    across, up = points[scored].T
+    (across, up), scores = points[scored].T, _scores(result)
     axes.scatter(across, up, c=scores, cmap=style.SHADES, norm=norm, s=14, linewidths=0, clip_on=False, zorder=2)
     cut = np.array([trial.state == "cut" for trial in result.trials])
     if cut.any():

@@ -312,7 +312,7 @@ def predict(
         if drives.robot != fitted.robot and not known.robot:
             cautions = (*cautions, f"the log is of the robot '{drives.robot}', and the model of '{fitted.robot}'")
         drives = replace(drives, episodes=tuple(map(without_outliers, drives.episodes)))
-        corrected, clocks = diagnosis.on_one_clock(drives, robot)
+        corrected, clocks = diagnosis.on_one_clock(drives, robot, model=fitted.theta)
         # Else a log is predicted whole, as it was recorded, long rests and all.
         drives = corrected if clocks.differ else drives
         table = diagnosis.predict(drives, robot, fitted.theta, horizon_s)

@@ -22,11 +22,13 @@ import numpy as np
 from proxytune.arrays import NORMAL_95
 from proxytune.diagnosis.motion import latency
 from proxytune.diagnosis.motion.drives import Drives, Floats, gather, number_of
+from proxytune.diagnosis.motion.innovations import expected_theta, twists_of
 from proxytune.diagnosis.motion.latency import Jump
 from proxytune.driving import Robot
 from proxytune.effects import PARAMETERS
 from proxytune.errors import LogError
 from proxytune.logs import Log, LogEpisode, Measured, join_windows
+from proxytune.space import Theta
 
 FURTHEST_S = 10.0
 """Clocks are looked for up to so far apart."""
@@ -77,27 +79,37 @@ class Clocks:
         return self.latency.value - self.offset.value
 
     @property
+    def odd(self) -> set[str]:
+        """The drives that have another clock than the rest, or one that jumps."""
+        return {*self.drives, *(jump.drive for jump in self.jumps)}
+
+    @property
     def differ(self) -> bool:
         """Tell whether any clock differs from another."""
         return bool(self.offset.value or self.drives or self.jumps or self.drift.value)
 
 
-def on_one_clock(log: Log, robot: Robot, like: Clocks | None = None) -> tuple[Log, Clocks]:
+def on_one_clock(log: Log, robot: Robot, like: Clocks | None = None, model: Theta | None = None) -> tuple[Log, Clocks]:
     """A log as it is fitted and judged: windows joined, long rests cut out, on one clock; and what its clocks were."""
     log = cut_out_long_rests(join_windows(log))
-    clocks = read_clocks(log, robot, like)
+    clocks = read_clocks(log, robot, like, model)
     return put_on_one_clock(log, clocks), clocks
 
 
-def read_clocks(log: Log, robot: Robot, like: Clocks | None = None) -> Clocks:
-    """Measure the latency of every drive of a log; where it is not what is left of a log it is like, clocks differ."""
+def read_clocks(log: Log, robot: Robot, like: Clocks | None = None, model: Theta | None = None) -> Clocks:
+    """Measure the latency of every drive of a log; where it is not what is left of a log it is like, clocks differ.
+
+    Latencies are those of a robot of first order. One that is slow in another way answers later to some commands than
+    to others, as if clocks jumped: with the θ of a `model` that leaves less of the speeds, clocks of single drives are
+    told only as they are beside its motion.
+    """
     drives = gather(log, robot, log.episodes, compared=False)
     speeds = latency.measured_speeds(drives) if len(drives.first) else None
     if speeds is None or not len(speeds.first):
         # Drives too short to tell are taken to have one clock.
         kept_s, later_s = np.tile((0.0, np.inf), (len(log.episodes), 1)), np.zeros(len(log.episodes))
         return Clocks(NONE, NONE, ASSUMED_DELAY_S, {}, (), later_s, kept_s, log.clock_offset_s)
-    squares, latencies, apart = _squares(log, drives, speeds)
+    squares, latencies, best, apart = _squares_by_reaction(log, drives, speeds)
     begin = np.array([episode.times[0] for episode in log.episodes])
     drift = NONE
     for _ in range(DRIFT_PASSES):
@@ -107,22 +119,13 @@ def read_clocks(log: Log, robot: Robot, like: Clocks | None = None) -> Clocks:
             break
         drift = _offset(latency.Latency(drift.value + more.rate, more.deviation), 0.0)
         log = without_drift(log, more.rate)
-        squares, latencies, apart = _squares(log, gather(log, robot, log.episodes), speeds)
-    kept, jumps = latency.stretches(log, squares, latencies)
-    # Few odd drives may be their clocks; a robot whose lag is another in every manoeuvre, as with ramps, has many.
-    most = max(1.0, RARE * len(log.episodes))
-    varied = len({jump.drive for jump in jumps}) > most
-    if varied:
-        # Where poses step, it is the clock, however many drives have it.
-        proven, at_steps = latency.stretches(log, squares, latencies, at_steps=True)
-        varied = len({jump.drive for jump in jumps} - {jump.drive for jump in at_steps}) > most
-        kept, jumps = (proven, at_steps) if varied else (kept, jumps)
-    jumped = {jump.drive for jump in jumps}
+        squares, latencies, best, apart = _squares_by_reaction(log, gather(log, robot, log.episodes), speeds)
+    kept, jumps, common, others = _single_clocks(log, squares, latencies)
+    if model is not None and (jumps or others):
+        beside = _squares_by_model(log, robot, speeds, latencies, model, float(best.squares.mean()))
+        if beside is not None:
+            kept, jumps, common, others = _single_clocks(log, beside, latencies)
     own = [squares.squares[latency.blocks_within(squares, e, kept[e])] for e in range(len(log.episodes))]
-    common, others = latency.deviants(own, latencies)
-    whole = [e for e in others if log.episodes[e].name not in jumped]
-    if varied or len(whole) > most:
-        others = {e: one for e, one in others.items() if e not in whole}
     alike = np.concatenate([part for e, part in enumerate(own) if e not in others])
     usual = latency.likeliest_latency(alike, latencies)
     assumed = like.left_s if like else max(robot.theta.get("delay", 0.0), ASSUMED_DELAY_S)
@@ -181,14 +184,68 @@ def without_drift(log: Log, rate: float) -> Log:
     return replace(log, episodes=tuple(replace(one, issued=own + rate * (own - first)) for own, one in issued))
 
 
-def _squares(log: Log, drives: Drives, speeds: latency.Speeds) -> tuple[latency.Blocks, Floats, bool]:
-    """Squares of blocks that the best reaction leaves, their latencies, and whether its own is impossible."""
+class _SingleClocks(NamedTuple):
+    """The clocks of single drives."""
+
+    kept_s: list[tuple[float, float]]  # the longest stretch of each drive without a jump [s after its beginning]
+    jumps: tuple[Jump, ...]
+    common_s: float  # the latency that most drives have
+    others: dict[int, latency.Latency]  # that of the drives which have another
+
+
+def _single_clocks(log: Log, squares: latency.Blocks, latencies: Floats) -> _SingleClocks:
+    kept, jumps = latency.stretches(log, squares, latencies)
+    # Few odd drives may be their clocks; a robot whose lag is another in every manoeuvre, as with ramps, has many.
+    most = max(1.0, RARE * len(log.episodes))
+    varied = len({jump.drive for jump in jumps}) > most
+    if varied:
+        # Where poses step, it is the clock, however many drives have it.
+        proven, at_steps = latency.stretches(log, squares, latencies, at_steps=True)
+        varied = len({jump.drive for jump in jumps} - {jump.drive for jump in at_steps}) > most
+        kept, jumps = (proven, at_steps) if varied else (kept, jumps)
+    jumped = {jump.drive for jump in jumps}
+    own = [squares.squares[latency.blocks_within(squares, e, kept[e])] for e in range(len(log.episodes))]
+    common, others = latency.deviants(own, latencies)
+    whole = [e for e in others if log.episodes[e].name not in jumped]
+    if varied or len(whole) > most:
+        others = {e: one for e, one in others.items() if e not in whole}
+    return _SingleClocks(kept, jumps, common, others)
+
+
+def _squares_by_reaction(
+    log: Log, drives: Drives, speeds: latency.Speeds
+) -> tuple[latency.Blocks, Floats, latency.Reaction, bool]:
+    """Squares of blocks that the best reaction leaves, their latencies, it, and whether its own is impossible."""
     best, apart = _reaction(drives, speeds)
     count = int(_reach(drives) / latency.STEP_S)
     latencies = best.latency_s + np.arange(-count, count + 1) * latency.STEP_S
+    expected = latency.speeds_by_reaction(drives, speeds, best, latencies)
+    return _in_blocks(log, drives, speeds, expected, count, latencies), latencies, best, apart
+
+
+def _squares_by_model(
+    log: Log, robot: Robot, speeds: latency.Speeds, latencies: Floats, model: Theta, most: float
+) -> latency.Blocks | None:
+    """Squares of blocks that a model leaves at the same latencies; None where that is more than `most` of the speeds.
+
+    `most` is a share of their variances.
+    """
+    drives = gather(log, robot, log.episodes)
+    late = latencies - expected_theta(model, drives.rate_hz).get("delay", 0.0)
+    expected = latency.speeds_by_model(speeds, twists_of(drives, model)[..., ::2], late * drives.tick_hz)
+    size = speeds.values.std(axis=0) + 1e-9
+    left = [float((((speeds.values - one) / size) ** 2).sum(axis=1).mean()) for one in expected]
+    usual = int(np.argmin(left))
+    return _in_blocks(log, drives, speeds, expected, usual, latencies) if left[usual] < most else None
+
+
+def _in_blocks(
+    log: Log, drives: Drives, speeds: latency.Speeds, expected: Floats, usual: int, latencies: Floats
+) -> latency.Blocks:
+    """Squares of blocks that expected speeds (latencies, M, 2) leave."""
     ends = np.array([len(e.times) for e in log.episodes]) * round(drives.tick_hz / log.rate_hz)
-    squares = latency.squares_by_latency(drives, speeds, best, latencies, ends)
-    return latency.Blocks(*latency.sum_in_blocks(latency.LATENCY_BLOCK_S, drives, speeds, squares)), latencies, apart
+    squares = latency.squares_by_latency(drives, speeds, expected, usual, latencies, ends)
+    return latency.Blocks(*latency.sum_in_blocks(latency.LATENCY_BLOCK_S, drives, speeds, squares))
 
 
 def _reach(drives: Drives) -> float:

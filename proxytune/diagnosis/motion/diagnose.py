@@ -243,23 +243,24 @@ def diagnose(
     rules: Rules = RULES,
     limits: Limits = LIMITS,
     folder: Path | None = None,
+    motion: Theta | None = None,
 ) -> Diagnosis:
     """Tune what is declared, find what is missing, and test both on drives kept aside, as `diagnose_log` says it.
+
+    Clocks of single drives are read beside the `motion` of a θ if one is given; else they are read again beside that
+    which is found, and where there are fewer then, all is done once more.
 
     Raises:
         LogError: If the log cannot bear the question (too short, no motion, other units), or a declared effect is
             unknown or does not act on motion.
     """
+    declared, given = tuple(declared), (log, test)
     names, parameters = declared_parameters(declared, robot.catalogue), robot.catalogue.parameters
     start = {name: robot.theta.get(name, parameters[name].neutral_value(robot.figures)) for name in names}
-    log, own = on_one_clock(log, robot)
-    clocks: tuple[Clocks, ...] = (own,)
-    if test is not None:
-        test, other = on_one_clock(test, robot, own)
-        clocks = (own, other)
+    log, test, clocks = _on_one_clock(*given, robot, motion)
     # An offset of clocks and a delay are one number: where an offset is taken out, the delay is fitted in any case.
     if any(one.offset.value for one in clocks) and "delay" not in names:
-        names, start = (*names, "delay"), {**start, "delay": own.assumed_delay_s}
+        names, start = (*names, "delay"), {**start, "delay": clocks[0].assumed_delay_s}
     parts = Parts(*(replace(drives, rules=rules) for drives in split(log, robot, test)))
     check_motion(log.name, parts.fitted)
     check_units(log.name, parts.fitted, start)
@@ -271,6 +272,24 @@ def diagnose(
     report("fitting what is declared")
     declared_alone = keep("declared", lambda: fit_declared(parts.fitted, start, names))
     selected = keep("selected", lambda: select_effects(declared_alone, seed, report))
+    if motion is None and any(one.odd for one in clocks):
+        motion = selected.model.theta
+        *_, again = _on_one_clock(*given, robot, motion)
+        if any(one.odd - other.odd for one, other in zip(clocks, again, strict=True)):
+            report("clocks are read beside this model, which moves as if they jumped")
+            log, test = given
+            return diagnose(
+                log,
+                robot,
+                declared,
+                test=test,
+                seed=seed,
+                report=report,
+                rules=rules,
+                limits=limits,
+                folder=folder,
+                motion=motion,
+            )
     named = keep("worth", lambda: effect_size.drop_negligible(selected, seed, parts.tested))
     report("fitting to windows of prediction")
     declared_fit, before = keep("declared_windows", lambda: multistep_fit.fit_multistep(named.declared))
@@ -337,6 +356,16 @@ def diagnose(
         learning=learning,
         period=period,
     )
+
+
+def _on_one_clock(
+    log: Log, test: Log | None, robot: Robot, motion: Theta | None
+) -> tuple[Log, Log | None, tuple[Clocks, ...]]:
+    log, own = on_one_clock(log, robot, model=motion)
+    if test is None:
+        return log, None, (own,)
+    test, other = on_one_clock(test, robot, own, motion)
+    return log, test, (own, other)
 
 
 def _at_edge(theta: Theta, effect: AdoptedEffect, drives: Drives) -> tuple[str, ...]:

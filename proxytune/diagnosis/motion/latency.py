@@ -57,7 +57,6 @@ class Reaction(NamedTuple):
     latency_s: float  # what latency lies beyond the motor's lag [s]
     lags_s: tuple[float, float]  # time constants: of the motors, and of turns beside that
     gains: Floats  # from commanded to measured forward speed and yaw rate (2, 2)
-    spread: Floats  # deviation of what it leaves of either
     squares: Floats  # what it leaves of each span (M,), in units of the whole log's
 
 
@@ -137,12 +136,8 @@ class _CommandedSpeeds:
         asked = np.empty((len(latencies_s), len(speeds.first), 2))
         for own, ends, gone in self._batches(speeds, lags_s):
             for number, latency_s in enumerate(latencies_s):
-                late = self.pad - latency_s * self.drives.tick_hz
-                shift, part = int(np.floor(late)), late - np.floor(late)
-                first, last = (
-                    (1.0 - part) * rows_at(gone, e, t + shift) + part * rows_at(gone, e, t + shift + 1) for e, t in ends
-                )
-                asked[number, own] = (last - first) / (speeds.last - speeds.first)[own, None]
+                moved = _moved(gone, ends, self.pad - latency_s * self.drives.tick_hz)
+                asked[number, own] = moved / (speeds.last - speeds.first)[own, None]
         return asked
 
     def _batches(self, speeds: Speeds, lags_s: tuple[float, float]) -> Iterator[tuple[slice, Ends, Floats]]:
@@ -178,7 +173,7 @@ class _CommandedSpeeds:
             gains = np.linalg.pinv(asked.T @ asked, hermitian=True) @ (asked.T @ speeds.values)
             rest = speeds.values - asked @ gains
             squares = ((rest / size) ** 2).sum(axis=1)
-            found.append(Reaction(latency_s, lags_s, gains, rest.std(axis=0) + 1e-9, squares))
+            found.append(Reaction(latency_s, lags_s, gains, squares))
         return found
 
     def reaction(self, speeds: Speeds, latency_s: float, lags_s: tuple[float, float]) -> Reaction:
@@ -192,22 +187,41 @@ def _misfit(found: Reaction) -> float:
     return float(found.squares.mean())
 
 
-def squares_by_latency(drives: Drives, speeds: Speeds, robot: Reaction, latencies: Floats, ends: Whole) -> Floats:
-    """Squares that this reaction leaves of each span at each latency (M, latencies), up to the ticks `ends` (E,)."""
+def _moved(gone: Floats, ends: Ends, late: float) -> Floats:
+    """Motion within spans (M, 2) by motion until each tick (E, T, 2), so many ticks on."""
+    shift, part = int(np.floor(late)), late - np.floor(late)
+    first, last = ((1.0 - part) * rows_at(gone, e, t + shift) + part * rows_at(gone, e, t + shift + 1) for e, t in ends)
+    return np.asarray(last - first)
+
+
+def speeds_by_reaction(drives: Drives, speeds: Speeds, robot: Reaction, latencies: Floats) -> Floats:
+    """The speeds that this reaction has over the same spans at each latency (latencies, M, 2)."""
     commanded = _CommandedSpeeds(drives, float(np.abs(latencies).max()))
-    asked = commanded.speeds(speeds, [robot.latency_s, *latencies.tolist()], robot.lags_s)
-    usual = _squares(speeds, robot, asked[0])
-    left = np.empty((len(speeds.episode), len(latencies)))
-    for number, latency in enumerate(latencies):
-        # Where the commands had ended, nothing speaks for or against a latency.
-        known = speeds.last - latency * drives.tick_hz <= ends[speeds.episode]
-        left[:, number] = np.where(known, _squares(speeds, robot, asked[number + 1]), usual)
-    return left
+    return np.asarray(commanded.speeds(speeds, latencies.tolist(), robot.lags_s) @ robot.gains)
 
 
-def _squares(speeds: Speeds, robot: Reaction, asked: Floats) -> Floats:
-    rest = (speeds.values - asked @ robot.gains) / robot.spread
-    return np.asarray((rest**2).sum(axis=1))
+def speeds_by_model(speeds: Speeds, twists: Floats, late_ticks: Floats) -> Floats:
+    """The speeds over the same spans by a model's motion of every tick (E, T, 2), so much later (latencies, M, 2)."""
+    pad = int(np.ceil(np.abs(late_ticks).max())) + 2
+    gone = np.cumsum(np.pad(twists, ((0, 0), (pad + 1, pad), (0, 0)), "edge"), axis=1)
+    ends = (speeds.episode, speeds.first), (speeds.episode, speeds.last)
+    moved = np.stack([_moved(gone, ends, pad - late) for late in late_ticks])
+    return np.asarray(moved / (speeds.last - speeds.first)[:, None])
+
+
+def squares_by_latency(
+    drives: Drives, speeds: Speeds, expected: Floats, usual: int, latencies: Floats, ends: Whole
+) -> Floats:
+    """Squares that expected speeds (latencies, M, 2) leave of each span (M, latencies), up to the ticks `ends` (E,).
+
+    They are in units of what the `usual` one of the latencies leaves.
+    """
+    rest = speeds.values - expected
+    rest /= rest[usual].std(axis=0) + 1e-9
+    squares = np.einsum("lmc,lmc->ml", rest, rest)
+    # Where the commands had ended, nothing speaks for or against a latency.
+    known = speeds.last[:, None] - latencies * drives.tick_hz <= ends[speeds.episode, None]
+    return np.asarray(np.where(known, squares, squares[:, [usual]]))
 
 
 def likeliest_latency(squares: Floats, latencies: Floats) -> Latency:

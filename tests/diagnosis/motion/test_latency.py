@@ -57,7 +57,8 @@ def test_a_few_drives_at_a_time_give_the_same_latency_to_the_bit(monkeypatch):
 
     def measured():
         best = reaction(few, speeds, 1.0)
-        return best, latency.squares_by_latency(few, speeds, best, latencies, ends)
+        expected = latency.speeds_by_reaction(few, speeds, best, latencies)
+        return best, latency.squares_by_latency(few, speeds, expected, 12, latencies, ends)
 
     whole, squares = measured()
     monkeypatch.setattr(latency, "AT_ONCE", 2 * few.duties.shape[1])

@@ -184,16 +184,10 @@ def without_drift(log: Log, rate: float) -> Log:
     return replace(log, episodes=tuple(replace(one, issued=own + rate * (own - first)) for own, one in issued))
 
 
-class _SingleClocks(NamedTuple):
-    """The clocks of single drives."""
-
-    kept_s: list[tuple[float, float]]  # the longest stretch of each drive without a jump [s after its beginning]
-    jumps: tuple[Jump, ...]
-    common_s: float  # the latency that most drives have
-    others: dict[int, latency.Latency]  # that of the drives which have another
-
-
-def _single_clocks(log: Log, squares: latency.Blocks, latencies: Floats) -> _SingleClocks:
+def _single_clocks(
+    log: Log, squares: latency.Blocks, latencies: Floats
+) -> tuple[list[tuple[float, float]], tuple[Jump, ...], float, dict[int, latency.Latency]]:
+    """The stretch of each drive without a jump, all jumps, the latency of most drives, and drives with another."""
     kept, jumps = latency.stretches(log, squares, latencies)
     # Few odd drives may be their clocks; a robot whose lag is another in every manoeuvre, as with ramps, has many.
     most = max(1.0, RARE * len(log.episodes))
@@ -209,7 +203,7 @@ def _single_clocks(log: Log, squares: latency.Blocks, latencies: Floats) -> _Sin
     whole = [e for e in others if log.episodes[e].name not in jumped]
     if varied or len(whole) > most:
         others = {e: one for e, one in others.items() if e not in whole}
-    return _SingleClocks(kept, jumps, common, others)
+    return kept, jumps, common, others
 
 
 def _squares_by_reaction(
@@ -220,32 +214,22 @@ def _squares_by_reaction(
     count = int(_reach(drives) / latency.STEP_S)
     latencies = best.latency_s + np.arange(-count, count + 1) * latency.STEP_S
     expected = latency.speeds_by_reaction(drives, speeds, best, latencies)
-    return _in_blocks(log, drives, speeds, expected, count, latencies), latencies, best, apart
+    return latency.squares_by_latency(log, drives, speeds, expected, count, latencies), latencies, best, apart
 
 
 def _squares_by_model(
     log: Log, robot: Robot, speeds: latency.Speeds, latencies: Floats, model: Theta, most: float
 ) -> latency.Blocks | None:
-    """Squares of blocks that a model leaves at the same latencies; None where that is more than `most` of the speeds.
-
-    `most` is a share of their variances.
-    """
+    """Squares that a model leaves; None where that is more than `most` of the speeds' variances."""
     drives = gather(log, robot, log.episodes)
     late = latencies - expected_theta(model, drives.rate_hz).get("delay", 0.0)
     expected = latency.speeds_by_model(speeds, twists_of(drives, model)[..., ::2], late * drives.tick_hz)
     size = speeds.values.std(axis=0) + 1e-9
     left = [float((((speeds.values - one) / size) ** 2).sum(axis=1).mean()) for one in expected]
     usual = int(np.argmin(left))
-    return _in_blocks(log, drives, speeds, expected, usual, latencies) if left[usual] < most else None
-
-
-def _in_blocks(
-    log: Log, drives: Drives, speeds: latency.Speeds, expected: Floats, usual: int, latencies: Floats
-) -> latency.Blocks:
-    """Squares of blocks that expected speeds (latencies, M, 2) leave."""
-    ends = np.array([len(e.times) for e in log.episodes]) * round(drives.tick_hz / log.rate_hz)
-    squares = latency.squares_by_latency(drives, speeds, expected, usual, latencies, ends)
-    return latency.Blocks(*latency.sum_in_blocks(latency.LATENCY_BLOCK_S, drives, speeds, squares))
+    if left[usual] >= most:
+        return None
+    return latency.squares_by_latency(log, drives, speeds, expected, usual, latencies)
 
 
 def _reach(drives: Drives) -> float:

@@ -247,8 +247,8 @@ def diagnose(
 ) -> Diagnosis:
     """Tune what is declared, find what is missing, and test both on drives kept aside, as `diagnose_log` says it.
 
-    Clocks of single drives are read beside the `motion` of a θ if one is given; else they are read again beside that
-    which is found, and where there are fewer then, all is done once more.
+    Clocks of single drives are read beside the `motion` of a θ if one is given; else beside that of the named effects,
+    once these are found: where there are fewer such clocks then, all is done once more.
 
     Raises:
         LogError: If the log cannot bear the question (too short, no motion, other units), or a declared effect is
@@ -276,7 +276,7 @@ def diagnose(
         motion = selected.model.theta
         *_, again = _on_one_clock(*given, robot, motion)
         if any(one.odd - other.odd for one, other in zip(clocks, again, strict=True)):
-            report("clocks are read beside this model, which moves as if they jumped")
+            report("clocks are read again beside this model, which moves as if they jumped")
             log, test = given
             return diagnose(
                 log,

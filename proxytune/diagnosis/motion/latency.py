@@ -210,18 +210,17 @@ def speeds_by_model(speeds: Speeds, twists: Floats, late_ticks: Floats) -> Float
 
 
 def squares_by_latency(
-    drives: Drives, speeds: Speeds, expected: Floats, usual: int, latencies: Floats, ends: Whole
-) -> Floats:
-    """Squares that expected speeds (latencies, M, 2) leave of each span (M, latencies), up to the ticks `ends` (E,).
-
-    They are in units of what the `usual` one of the latencies leaves.
-    """
+    log: Log, drives: Drives, speeds: Speeds, expected: Floats, usual: int, latencies: Floats
+) -> "Blocks":
+    """Squares that expected speeds (latencies, M, 2) leave, in units of what the `usual` one of the latencies does."""
+    ends = np.array([len(episode.times) for episode in log.episodes]) * round(drives.tick_hz / log.rate_hz)
     rest = speeds.values - expected
     rest /= rest[usual].std(axis=0) + 1e-9
     squares = np.einsum("lmc,lmc->ml", rest, rest)
     # Where the commands had ended, nothing speaks for or against a latency.
     known = speeds.last[:, None] - latencies * drives.tick_hz <= ends[speeds.episode, None]
-    return np.asarray(np.where(known, squares, squares[:, [usual]]))
+    squares = np.where(known, squares, squares[:, [usual]])
+    return Blocks(*sum_in_blocks(LATENCY_BLOCK_S, drives, speeds, squares))
 
 
 def likeliest_latency(squares: Floats, latencies: Floats) -> Latency:

@@ -171,6 +171,18 @@ def test_a_slow_or_late_robot_is_no_clock_problem(theta):
     assert not read_clocks(planted_log({**TRUTH, **theta}, episodes=6, seconds=20.0, noise=CALM), ROBOT).differ
 
 
+def test_a_slow_motor_is_as_if_clocks_jumped_but_not_beside_its_own_motion_where_true_jumps_remain():
+    slow = {**TRUTH, "slew_rate": 1.6}
+    log = planted_log(slow, episodes=12, seconds=40.0)
+    assert len(read_clocks(log, ROBOT).odd) > 3
+    assert not read_clocks(log, ROBOT, model=slow).differ
+    # A model that leaves more than a robot of first order says nothing of clocks.
+    assert read_clocks(log, ROBOT, model={"trim": 0.3}).odd == read_clocks(log, ROBOT).odd
+    jumped = hidden.make_log(CASE, late_s=in_one_drive(0.2, after=400), **SHORT)
+    (jump,) = read_clocks(jumped, ROBOT, model={"trim": CASE.trim, "delay": CASE.delay}).jumps
+    assert (jump.drive, jump.by_s) == ("03", pytest.approx(0.2, abs=0.02))
+
+
 def test_a_robot_that_repeats_itself_is_stuck_or_rests_is_no_clock_problem():
     times = np.arange(1200) / 20.0
     turn = 0.2 * np.sin(2.0 * np.pi * times / 6.0)

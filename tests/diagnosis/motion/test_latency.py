@@ -51,14 +51,15 @@ def test_the_vertex_between_steps_is_found_where_there_is_one():
 
 
 def test_a_few_drives_at_a_time_give_the_same_latency_to_the_bit(monkeypatch):
-    drives = drives_of(planted_log({"delay": 0.1, "motor_lag.time_constant": 0.3}, episodes=5, seconds=20.0))
+    log = planted_log({"delay": 0.1, "motor_lag.time_constant": 0.3}, episodes=5, seconds=20.0)
+    drives = drives_of(log)
     few = drives.only(drives.episode != 2)
-    speeds, latencies, ends = measured_speeds(few), np.arange(-10, 11) * 0.05, np.full(5, 1200)
+    speeds, latencies = measured_speeds(few), np.arange(-10, 11) * 0.05
 
     def measured():
         best = reaction(few, speeds, 1.0)
         expected = latency.speeds_by_reaction(few, speeds, best, latencies)
-        return best, latency.squares_by_latency(few, speeds, expected, 12, latencies, ends)
+        return best, latency.squares_by_latency(log, few, speeds, expected, 12, latencies).squares
 
     whole, squares = measured()
     monkeypatch.setattr(latency, "AT_ONCE", 2 * few.duties.shape[1])

@@ -78,6 +78,5 @@ def write_bank_page(bank: Bank, table: Path) -> Path:
     page = table.with_name("report.html")
     learn = f'Measure these agents on the target and write `learn_from = ["{table.parent.name}"]` into its study.toml.'
     title = f"{bank.settings.name}: what can a target learn from this bank?"
-    view = View(title, bank_sentence(bank), learn, (bank_table(bank),))
-    write_page(page, view, study_foot(bank.settings))
+    write_page(page, View(title, bank_sentence(bank), learn, (bank_table(bank),)), study_foot(bank.settings))
     return page

@@ -215,8 +215,7 @@ def choices_sentences(assessments: Mapping[str, Assessment], selection: Selectio
                 lines.append(f"{choice.better} saves {gain} real rollouts of an agent more than {choice.worse}, {told}")
             else:
                 lines.append(f"choosing by {choice.better} instead of {choice.worse} gains {gain} on {target}, {told}")
-    both = selection.together
-    if both is None:
+    if (both := selection.together) is None:
         return lines
     names, decision = " and ".join(both.proxies), both.decision
     risk = f"deploy {decision.winner}, at an expected regret of {short(decision.expected_regret[decision.winner], 2)}"

@@ -59,8 +59,7 @@ def families_answer(compared: ComparedFamilies) -> str:
 def families_next_step(compared: ComparedFamilies) -> str:
     """The step that brings most."""
     choice, fresh = compared.predicts, {one.name: one.fresh for one in compared.families}
-    best = fresh.get(choice.best or "")
-    if best is None:
+    if (best := fresh.get(choice.best or "")) is None:
         return "run the study again, to drive every family's best θ afresh."
     if best.chance.explains:
         return f"raise stop.wall_time_s (now {compared.settings.stop.wall_time_s:g}), or add agents that differ more."
@@ -338,8 +337,7 @@ DECADE = 10.0
 
 def _draw(axes: Axes, panel: Panel, names: list[str]) -> None:
     for place, name in enumerate(names):
-        value = panel.values.get(name)
-        if value is None:
+        if (value := panel.values.get(name)) is None:
             axes.annotate(
                 "not known", (0.5, place), xycoords=("axes fraction", "data"), fontsize=7, ha="center", va="center",
                 color="0.3",

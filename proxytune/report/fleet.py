@@ -151,8 +151,7 @@ def fleet_figure(fleet: Fleet) -> Figure:
     for box, axes in zip(intervals, panels, strict=True):
         if box.name in fleet.mean:
             mean, reach = fleet.mean[box.name].value, 2.0 * fleet.deviation[box.name].value
-            look: dict[str, Any] = {"color": style.GREEN, "alpha": 0.15, "linewidth": 0, "label": "fleet: mean ± 2 SD"}
-            axes.axvspan(mean - reach, mean + reach, **look)
+            axes.axvspan(mean - reach, mean + reach, color=style.GREEN, alpha=0.15, lw=0, label="fleet: mean ± 2 SD")
             axes.axvline(mean, color=style.GREEN, linewidth=1.0, linestyle="--")
         for place, robot in enumerate(robots):
             label = "own scores (95 %)" if robot.fits else "misfit, left out"

@@ -126,9 +126,8 @@ def _all_drawn(assessments: Assessments, selection: Selection | None) -> Iterato
     files = file_names(assessments)
     for name, assessment in assessments.items():
         file, whose = ("", "") if selection is None else (f"_{files[name]}", f": {name}")
-        many = len(assessment.inputs.agents) > MOST
         for kind, figure in figures_of_scores(assessment).items():
-            rest = REST.get(kind, "") if many else ""
+            rest = REST.get(kind, "") if len(assessment.inputs.agents) > MOST else ""
             yield f"{kind}{file}", figure, picture_of("score", kind, figure, whose=whose, rest=rest)
 
 

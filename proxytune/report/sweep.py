@@ -46,8 +46,7 @@ def curve_name(curve: SweepCurve) -> str:
 
 def held_mark(base: Theta) -> str:
     """Six characters that stand for the values that parameters are held at."""
-    values = sorted((name, float(value)) for name, value in base.items())
-    return digest(json.dumps(values), length=6)
+    return digest(json.dumps(sorted((name, float(value)) for name, value in base.items())), length=6)
 
 
 def held_texts(curve: SweepCurve) -> list[str]:
@@ -367,10 +366,9 @@ def bar_points(curve: SweepCurve) -> tuple[list[int], int]:
     low, high = values[0], values[-1]
     middle = int(np.abs(values - curve.base.get(curve.parameter, (low + high) / 2)).argmin())
     wanted = values[middle] + SIDE * (high - low) * np.array([-1.0, 1.0])
-    below, above = range(middle), range(middle + 1, len(values))
     sides = [
         [min(indices, key=lambda index: abs(values[index] - goal))] if indices else []
-        for indices, goal in ((below, wanted[0]), (above, wanted[1]))
+        for indices, goal in ((range(middle), wanted[0]), (range(middle + 1, len(values)), wanted[1]))
     ]
     return [*sides[0], middle, *sides[1]], middle
 
@@ -383,8 +381,7 @@ WIDEST = 20
 def draw_series(axes: Axes, series: Series, colour: str, marker: str, label: str = "", band: str = "") -> None:
     """A line through the scores, with its band of 95 % intervals, and names of both for a legend."""
     known = {value: one.value for value, one in series.estimates.items() if one.value is not None}
-    banded = [(value, *one.interval) for value, one in series.estimates.items() if one.interval]
-    if banded:
+    if banded := [(value, *one.interval) for value, one in series.estimates.items() if one.interval]:
         places, lows, highs = np.array(banded).T
         axes.fill_between(places, lows, highs, color=colour, alpha=0.18, linewidth=0, label=band)
     axes.plot(list(known), list(known.values()), marker=marker, color=colour, ms=3, lw=1.2, label=label)

@@ -20,7 +20,7 @@ from proxytune.report.export.ros import commands_text, player_text
 from proxytune.report.html import write_page
 from proxytune.report.meanings import findings, fitted
 from proxytune.report.text import group_texts, table_text
-from proxytune.report.view import Drawn, Paragraphs, Part, Picture, Table, View, columns_of, foot_of
+from proxytune.report.view import Drawn, Paragraphs, Picture, Table, View, columns_of, foot_of
 from proxytune.report.wording import fixed, short, span
 from proxytune.report.writing import CAPTIONS, picture_of, save_figures, write_text
 
@@ -61,8 +61,7 @@ def diagnosis_view(found: LogDiagnosis, figures: Mapping[str, Drawn]) -> View:
     next_step = f"{'; '.join(drives)}." if drives else VERDICTS[part.verdict]["next"] if part else ""
     tables = [table for _, own, _ in _said(found) for table in own]
     title = f"{found.log}: what does the model of {found.robot.name} lack?"
-    parts: tuple[Part, ...] = (*diagnosis_pictures(figures), *tables, *paragraphs)
-    return View(title, f"{diagnosis_headline(found)}.", next_step, parts)
+    return View(title, f"{diagnosis_headline(found)}.", next_step, (*diagnosis_pictures(figures), *tables, *paragraphs))
 
 
 def diagnosis_text(found: LogDiagnosis) -> Group:

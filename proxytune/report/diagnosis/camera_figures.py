@@ -37,8 +37,7 @@ def camera_figures(diagnosis: CameraDiagnosis) -> Mapping[str, Figure]:
 
 def _ranking_figure(diagnosis: CameraDiagnosis) -> Figure | None:
     """Draw what is lost with each effect alone, against all effects together; None where all are declared."""
-    tried = diagnosis.candidates
-    if not tried:
+    if not (tried := diagnosis.candidates):
         return None
     # With the declared effects alone, in the measure that the candidates are ranked by [nats]
     named = diagnosis.named
@@ -193,8 +192,7 @@ def telling_frames(diagnosis: CameraDiagnosis) -> list[int]:
     points = np.bincount(views.edges.frame, minlength=views.count)
     change = np.nan_to_num(np.abs(before.frames - after.frames)) + 1e-9
     merit = np.where(points >= np.median(points), change * points, 0.0)
-    halves = np.array_split(np.arange(views.count), SHOWN)
-    return [int(half[np.argmax(merit[half])]) for half in halves]
+    return [int(half[np.argmax(merit[half])]) for half in np.array_split(np.arange(views.count), SHOWN)]
 
 
 def outline_field(fit: CameraFit, frame: int, white: bool) -> tuple[Floats, Floats, Floats]:
@@ -208,8 +206,7 @@ def outline_field(fit: CameraFit, frame: int, white: bool) -> tuple[Floats, Floa
     sideways = np.tile((1.0, 0.0), (count, 1))
     every = Edges(np.full(count, frame), np.full(count, white), columns.ravel(), rows.ravel(), sideways)
     there = project(replace(fit.views, edges=every), fit.state)
-    distance = np.where(there.near, there.residual, np.nan)
-    return columns, rows, distance.reshape(columns.shape)
+    return columns, rows, np.where(there.near, there.residual, np.nan).reshape(columns.shape)
 
 
 COLOURS = (style.VERMILLION, style.BLUE)

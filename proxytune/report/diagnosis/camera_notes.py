@@ -77,8 +77,7 @@ def _say_blemish(blemish: Blemish, rows: int, columns: int) -> str:
 
 def _say_map(laid: LaidMap) -> list[str]:
     lines = [_say_line(line) for line in laid.lines[:MOST_LINES]]
-    rest = len(laid.lines) - MOST_LINES
-    if rest > 0:
+    if (rest := len(laid.lines) - MOST_LINES) > 0:
         lines.append(f"{rest} more lines of the map lie beside their places: see `map` in diagnosis.json")
     for name, width in laid.widths.items():
         if abs(width.value) >= WIDER_M and not width.interval[0] <= 0.0 <= width.interval[1]:

@@ -231,11 +231,10 @@ def learnt_document(learning: Learning) -> dict[str, Any]:
     Keys of `ratio` and `guard` are horizons in seconds. `groups` and `share` are empty where nothing is used.
     """
     beside, like = learning.discrepancy, learning.looks_like
-    share = beside.share if beside.used else {}
     return {
         "used": beside.used,
         "groups": list(learning.depends_on(())),
-        "share": dict(share),
+        "share": dict(beside.share if beside.used else {}),
         "ratio": ratios_document({error.horizon_s: error.ratio for error in learning.errors}),
         "guard": ratios_document(beside.guard),
         "errors": [

@@ -46,8 +46,7 @@ def effect_curve(diagnosis: Diagnosis) -> Figure | None:
     if not found.adopted:
         best = next(iter(found.unnamed_curves), None)
         return None if best is None else means_figure(diagnosis, best, CUE_PANELS[best.group.name])
-    first = found.adopted[0]
-    kind = _curve_kind(first, diagnosis.robot.catalogue)
+    kind = _curve_kind(found.adopted[0], diagnosis.robot.catalogue)
     if isinstance(kind, Means):
         return means_figure(diagnosis, _curve(found.curves, kind.cue), kind.panels)
     if kind is not WheelCurve.STEADY:
@@ -130,8 +129,7 @@ def _draw_steady(axes: Axes, commands: Floats, models: Mapping[str, Floats]) -> 
 
 def _steady(drives: Drives, theta: Theta, commands: Floats) -> Floats:
     """Wheel speeds, of a car speed and angle (n, 2), as fractions of full that commands (n, 2) come to from rest."""
-    ticks = round(HELD_S * drives.tick_hz)
-    duties = np.broadcast_to(commands[:, None], (len(commands), ticks, 2))
+    duties = np.broadcast_to(commands[:, None], (len(commands), round(HELD_S * drives.tick_hz), 2))
     return wheel_speeds(_driven(drives, duties), theta)[:, -1]
 
 
@@ -155,8 +153,7 @@ def _steps_figure(diagnosis: Diagnosis) -> Figure:
     """Wheel speed after a step of the command and, for backlash, after its reversal."""
     found, drives = diagnosis.found, diagnosis.found.declared.drives
     figure, axes = style.one_panel(2.4)
-    catalogue = diagnosis.robot.catalogue
-    reverses = any(_curve_kind(one, catalogue) is WheelCurve.REVERSAL for one in found.adopted)
+    reverses = any(_curve_kind(one, diagnosis.robot.catalogue) is WheelCurve.REVERSAL for one in found.adopted)
     lasts = STEPS_S if reverses else STEP_S
     times = np.arange(round(lasts * drives.tick_hz)) / drives.tick_hz
     size = min(0.5, float(np.abs(drives.duties).max()))
@@ -253,8 +250,7 @@ def means_figure(diagnosis: Diagnosis, curve: SignalCurve | None, panels: tuple[
     figure, all_axes = style.panel_grid(len(panels), 1.7, 0.6)
     rates = rates_of(diagnosis, curve)
     for axes, panel in zip(all_axes, panels, strict=True):
-        signal = _signal(diagnosis.found.declared.drives, rates, curve, panel)
-        draw_means(axes, rates, signal, panel)
+        draw_means(axes, rates, _signal(diagnosis.found.declared.drives, rates, curve, panel), panel)
         axes.set_xlabel(panel.label, fontsize=8)
     style.legend_below(figure, *all_axes)
     return figure

@@ -2,7 +2,7 @@
 
 import textwrap
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -47,8 +47,7 @@ def error_figure(diagnosis: Diagnosis) -> Figure:
             ends = factor * np.array([one.interval for one in rms_errors])
             ends = np.where(np.isfinite(ends).all(axis=1, keepdims=True), ends, values[:, None])
             arms = np.maximum(0.0, np.stack((values - ends[:, 0], ends[:, 1] - values)))
-            look: dict[str, Any] = {"fmt": marker, "color": colour, "ms": 4, "capsize": 2, "lw": 1.0}
-            axes.errorbar(spots + shift, values, yerr=arms, label=name, **look)
+            axes.errorbar(spots + shift, values, arms, fmt=marker, color=colour, ms=4, capsize=2, lw=1.0, label=name)
         # A bar from the lower to the upper end, a line at the lower.
         lower, heights = [low for low, _ in floors], [high - low for low, high in floors]
         axes.bar(spots, heights, 0.5, lower, color=style.GREEN, alpha=0.2, zorder=0)

@@ -109,8 +109,7 @@ MOST_TICKS = 5
 
 def learnt_figure(learning: Learning) -> Figure | None:
     """A panel for each learnt curve, two in a row, largest share first; nothing where none is used."""
-    effect = learnt_effect(learning.theta)
-    if effect is None:
+    if (effect := learnt_effect(learning.theta)) is None:
         return None
     order = list(learning.discrepancy.share)
     members = {curve.group for curve in effect.curves} - {LEVEL}

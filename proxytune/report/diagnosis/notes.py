@@ -43,8 +43,7 @@ def motion_notes(diagnosis: Diagnosis) -> list[str]:
     lines += [_say_immaterial(effect, diagnosis) for effect in diagnosis.negligible]
     if diagnosis.verdict == "partly explained":
         lines.append("beware: added effects may stand in for what is still unnamed: their values are no physics yet")
-    worse = [f"{error.horizon_s:g} s" for error in diagnosis.errors if error.ratio.interval[0] > 1.0]
-    if worse:
+    if worse := [f"{error.horizon_s:g} s" for error in diagnosis.errors if error.ratio.interval[0] > 1.0]:
         lines.append(f"beware: positions after {', '.join(worse)} are predicted worse than before; check the heading")
     if diagnosis.multistep is not None:
         ratios = ", ".join(f"{h:g} s: {one.value:.2f}" for h, one in diagnosis.multistep.ratios.items())
@@ -125,8 +124,7 @@ def _ends(one: Ratio, decimals: int) -> str:
 
 def next_drives(diagnosis: Diagnosis) -> list[str]:
     """Say what to drive next, a line each; nothing where there is nothing to tell apart."""
-    drive = diagnosis.next_drive
-    if drive is None:
+    if (drive := diagnosis.next_drive) is None:
         return []
     often = f"{drive.times} times from the same commands, and diagnose the log with these drives in it"
     if drive.between[0] == "noise":

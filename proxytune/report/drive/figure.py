@@ -179,7 +179,7 @@ WIDTHS = {"proxy": 1.0, "target": 2.2}
 def draw_paths(axes: Axes, pair: SideBySide) -> None:
     """Draw every side's path, the common start, and where each ends."""
     for side, episode in reversed(pair.sides.items()):
-        places, thin = episode.places, {"markeredgecolor": "white", "markeredgewidth": 0.5}
+        places = episode.places
         (line,) = axes.plot(*places.T, color=COLOURS[side], linewidth=WIDTHS[side], solid_capstyle="round")
         if side == "target":
             line.set_path_effects(list(CASING))
@@ -187,8 +187,7 @@ def draw_paths(axes: Axes, pair: SideBySide) -> None:
             # Along the path, not along the heading: a robot may drive backwards
             step = places[row] - places[row - 1]
             turned = float(np.degrees(np.arctan2(step[1], step[0]))) - 90.0
-            mark: dict[str, Any] = {"marker": (3, 0, turned), "color": COLOURS[side], "markersize": 5.5, **thin}
-            axes.plot(*places[row], **mark)
+            axes.plot(*places[row], marker=(3, 0, turned), color=COLOURS[side], ms=5.5, mec="white", mew=0.5)
     draw_start(axes, pair.proxy.places)
     edge: dict[str, Any] = {"markeredgecolor": "white", "markeredgewidth": 0.7, "clip_on": False, "zorder": 4}
     marks = {"start": ("black", pair.proxy.places[0])}
@@ -212,14 +211,12 @@ def arrow_rows(places: Floats) -> list[int]:
     """Rows of a path (times, 2) at which an arrow shows the direction: evenly spaced along it, none at its ends."""
     driven = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(places, axis=0).T))))
     apart = max(LEAST_M, driven[-1] / (ARROWS + 1))
-    wanted = np.arange(apart / 2.0, driven[-1], apart)
-    return [int(row) for row in np.searchsorted(driven, wanted)]
+    return [int(row) for row in np.searchsorted(driven, np.arange(apart / 2.0, driven[-1], apart))]
 
 
 def draw_start(axes: Axes, places: Floats) -> None:
     """Mark where a path (times, 2) starts."""
-    edge: dict[str, Any] = {"markeredgecolor": "black", "markeredgewidth": 1.0, "zorder": 4}
-    axes.plot(*places[0], "o", color="white", markersize=6, **edge)
+    axes.plot(*places[0], "o", color="white", markersize=6, markeredgecolor="black", markeredgewidth=1.0, zorder=4)
 
 
 SIZE = np.array((0.24, 0.06))

@@ -208,8 +208,7 @@ def write_gif(path: Path, frames: Iterable[Frame], samples: Sequence[Frame], fra
 
 def find_ffmpeg() -> str:
     """The program that writes an MP4, installed or of the package imageio-ffmpeg; refused if there is none."""
-    found = shutil.which(str(matplotlib.rcParams["animation.ffmpeg_path"]))
-    if found:
+    if found := shutil.which(str(matplotlib.rcParams["animation.ffmpeg_path"])):
         return found
     try:
         return str(importlib.import_module("imageio_ffmpeg").get_ffmpeg_exe())

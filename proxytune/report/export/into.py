@@ -71,8 +71,7 @@ def patch(instance: Instance, path: Path, output: Path, wheels: Sequence[str] = 
         made = f"{path.name.removesuffix('.xacro').removesuffix('.urdf')}.urdf"
         raise InputError(f"{path}: {XACRO.format(path.name, made)}")
     xml = XmlPatch(path)
-    reader = READERS.get(xml.root.tag)
-    if reader is None:
+    if (reader := READERS.get(xml.root.tag)) is None:
         raise InputError(f"{path}: begins with <{xml.root.tag}>; give a URDF (<robot>), <sdf> or <mujoco>")
     try:
         with np.errstate(invalid="raise", over="raise"):
@@ -215,8 +214,7 @@ class _Sdf:
                 self.xml.set_text(radius, _numbers([factor * float(radius.text or "0")]))
 
         def move(by: Floats) -> None:
-            spot = placed.find("pose")
-            if spot is None:
+            if (spot := placed.find("pose")) is None:
                 raise InputError(f"{self.xml.path}: {placed.tag} '{placed.get('name')}' states no <pose>; give it one")
             turned = (self.pose_of(placed) @ np.linalg.inv(_six(spot)))[:3, :3]
             values = [float(value) for value in (spot.text or "").split()]

@@ -59,8 +59,7 @@ def mjcf_text(instance: Instance) -> str:
             f'biasprm="{full * offset:.9g} {-stiffness:.9g} 0" ctrllimited="true" ctrlrange="{-limit:.9g} {limit:.9g}"',
             *_follows(instance, instance.value("steering_lag", "time_constant", 0.0) - 2.0 / STEERS_HZ),
         ]
-        throttle = _speed_servo(instance, 'name="throttle" tendon="rear"', 0, 2)
-        actuators = [throttle, " ".join(words) + "/>"]
+        actuators = [_speed_servo(instance, 'name="throttle" tendon="rear"', 0, 2), " ".join(words) + "/>"]
     else:
         sides = enumerate(("left", "right"))
         actuators = [_speed_servo(instance, f'name="{one}" joint="axle_{one}"', side, 1) for side, one in sides]

@@ -94,11 +94,10 @@ RATE_HZ = 60.0
 def node_text(instance: Instance, has: Sequence[str] = ()) -> str:
     """The node as a Python file: all values in it, no other file needed."""
     names = REQUIRED[instance.robot.drive]
-    kinds = instance.robot.catalogue
     known = {
         name: value
         for name, value in sorted(instance.theta.items())
-        if is_learnt(name) or kinds.effect(effect_of(name)).stage in BENT
+        if is_learnt(name) or instance.robot.catalogue.effect(effect_of(name)).stage in BENT
     }
     return fill(
         "ackermann_filter.py.txt" if instance.steers else "cmd_vel_filter.py.txt",

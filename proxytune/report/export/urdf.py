@@ -46,11 +46,10 @@ def urdf_text(instance: Instance) -> str:
 def _set_wheel(root: ET.Element, joint: ET.Element, left_m: float, radius_m: float, gain: float) -> None:
     """Give a wheel its place and its radius; it goes on touching the floor."""
     parent, link = end_of(joint, "parent"), end_of(joint, "child")
-    above = driving.link_pose(root, parent)
     centre = driving.link_pose(root, link)
     centre[1, 3] = left_m
     centre[2, 3] += (gain - 1.0) * radius_m
-    _set_origin(joint, np.linalg.inv(above) @ centre)
+    _set_origin(joint, np.linalg.inv(driving.link_pose(root, parent)) @ centre)
     for element in driving.links_called(root, link)[:1]:
         for geometry in (*element.iterfind("*/geometry/sphere"), *element.iterfind("*/geometry/cylinder")):
             geometry.set("radius", f"{gain * float(geometry.get('radius', radius_m)):.9g}")
@@ -58,8 +57,7 @@ def _set_wheel(root: ET.Element, joint: ET.Element, left_m: float, radius_m: flo
 
 def _mount(root: ET.Element, link: str, pose: Floats) -> None:
     """Fix a link to the robot at a pose in the root link's frame; where there is none of that name, add it."""
-    joints = [one for one in root.iter("joint") if end_of(one, "child") == link]
-    if joints:
+    if joints := [one for one in root.iter("joint") if end_of(one, "child") == link]:
         _set_origin(joints[0], np.linalg.inv(driving.link_pose(root, end_of(joints[0], "parent"))) @ pose)
         return
     driving.add_little_mass(ET.SubElement(root, "link", name=link))

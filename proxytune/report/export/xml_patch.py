@@ -88,8 +88,7 @@ class XmlPatch:
     def _write(self, element: ET.Element, place: tuple[int, int], text: str) -> None:
         """Put a text between an element's tags; one that has no last tag gets it."""
         begin, opened, _ = self._places[element]
-        empty = re.search(rb"\s*/>$", self._bytes[begin:opened])
-        if empty:
+        if empty := re.search(rb"\s*/>$", self._bytes[begin:opened]):
             place, text = (begin + empty.start(), opened), f">{text}</{element.tag}>"
         self._changes.append((*place, text))
 

@@ -28,7 +28,6 @@ def convergence_figure(result: StudyResult) -> Figure:
     answers = [(trial.number, result.value_of(answer)) for trial, answer in pairs if answer is not None]
     # Where fresh episodes chose another answer in the end, the line ends at that one's.
     ends = [*answers, (result.trials[-1].number + 1, result.value_of(result.best.trial))]
-    label = _label(result)
     named = [style.LineName("answer\nso far", style.VERMILLION, ends[-1][1] or 0.0)]
     axes.step(*zip(*ends, strict=True), where="post", color=style.VERMILLION, linewidth=1.5, label=named[0].words)
     if result.study.objective == PRPV:
@@ -47,7 +46,7 @@ def convergence_figure(result: StudyResult) -> Figure:
         axes.set_ylim(bottom=min(-0.4, -0.02 * axes.get_ylim()[1]))
         axes.yaxis.set_major_locator(MaxNLocator(integer=True, steps=[1, 2, 5, 10]))
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-    style.dress(axes, "trial", label)
+    style.dress(axes, "trial", _label(result))
     style.name_lines(axes, named, TWO_LINES)
     style.legend_below(figure, axes, without=[name.words for name in named])
     return figure
@@ -90,8 +89,7 @@ SMOOTH_PROFILE = 0.5
 
 def profiles_figure(result: StudyResult) -> Figure:
     """Draw how probable each value of each parameter is, given the target's scores, over the box that was searched."""
-    intervals = result.study.settings.space.intervals
-    figure, panels = style.panel_grid(len(intervals), 1.3, 0.45)
+    figure, panels = style.panel_grid(len(result.study.settings.space.intervals), 1.3, 0.45)
     for place, axes in enumerate(panels):
         _draw_profile(axes, result, place)
     for axes in panels[::2]:

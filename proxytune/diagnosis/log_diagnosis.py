@@ -6,6 +6,7 @@ reason is told. `predict_pictures` draws what a fitted model's camera would have
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple, TypeVar
 
@@ -74,15 +75,10 @@ def diagnose_log(
         SettingsError: If a log of frames alone is of a robot without a camera, or its map cannot be read.
     """
     on_motion, on_camera = _declared_by_kind(log, robot, declared)
-
-    def motion() -> Diagnosis:
-        return diagnose(
-            log, robot, on_motion, test=test, seed=seed, report=report, rules=rules, limits=limits, folder=folder
-        )
-
-    def camera() -> CameraDiagnosis:
-        return diagnose_camera(log, robot, on_camera, seed=seed, report=report, folder=folder)
-
+    motion = partial(
+        diagnose, log, robot, on_motion, test=test, seed=seed, report=report, rules=rules, limits=limits, folder=folder
+    )
+    camera = partial(diagnose_camera, log, robot, on_camera, seed=seed, report=report, folder=folder)
     cautions = log_cautions(log, robot.figures)
     if log.frames is None:
         return LogDiagnosis(log.name, robot, motion(), None, cautions=cautions)

@@ -252,8 +252,7 @@ def _band_variances(measured: Pictures, paint: NDArray[np.int8], apart: int) -> 
 def _variance(values: Floats) -> float:
     """Variance without stains and the like, beyond four standard deviations."""
     spread = 1.4826 * np.median(np.abs(values)) + 0.5
-    kept = values[np.abs(values) < 4.0 * spread]
-    return float(np.square(kept).mean())
+    return float(np.square(values[np.abs(values) < 4.0 * spread]).mean())
 
 
 SHARP_PX = 2.0

@@ -343,8 +343,7 @@ def gather_views(log: Log, frames: Frames, robot: Robot) -> Gathered:
     edges = edges.only(np.arange(len(edges.row)) % EVERY == 0)
     optics = Optics(robot, *pictures.shape[1:3])
     position_m = tracks.share * (ASSUMED_M if frames.position_m is None else frames.position_m)
-    heading_deg = ASSUMED_DEG if frames.heading_deg is None else frames.heading_deg
-    heading_rad = tracks.share * np.radians(heading_deg)
+    heading_rad = tracks.share * np.radians(ASSUMED_DEG if frames.heading_deg is None else frames.heading_deg)
     views = Views(edges, tracks, Markings(road), optics, position_m, float(heading_rad), road.paint.tape_m)
     count, every = len(numbers), len(frames.paths)
     notes = [f"{every - known} of {every} frames have no pose at their time and are left out"] if known < every else []

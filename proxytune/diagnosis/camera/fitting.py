@@ -181,5 +181,4 @@ PASSES = 4
 def pose_scatter(fit: CameraFit) -> tuple[float, float]:
     """Standard deviations of places [m] and headings [rad], as expectation maximisation has them."""
     squares = fit.state.poses**2 + fit.pose_sd**2
-    place, turn = float(np.sqrt(squares[:, :2].mean())), float(np.sqrt(squares[:, 2].mean()))
-    return place, turn
+    return float(np.sqrt(squares[:, :2].mean())), float(np.sqrt(squares[:, 2].mean()))

@@ -323,5 +323,4 @@ def _regress(expected: Singles, logged: Singles, weight: Singles) -> tuple[Singl
         left = up - slope * across
         scale = 2.0 * 1.4826 * np.median(np.abs(left), axis=0) + 1.0
         now = weight * np.minimum(1.0, scale / np.maximum(np.abs(left), 1e-3))
-    error = np.sqrt(((now * across * left) ** 2).sum(axis=0)) / squares
-    return slope, error
+    return slope, np.sqrt(((now * across * left) ** 2).sum(axis=0)) / squares

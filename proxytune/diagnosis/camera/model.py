@@ -86,8 +86,7 @@ def project(views: Views, state: State) -> Projection:
 
 def camera_slopes(views: Views, state: State, there: Projection, names: Sequence[str]) -> Floats:
     """Slopes of the residuals by parameters of the camera (n, names)."""
-    figures = views.optics.figures(state.theta)
-    points = _ground(figures, views, 0.0)
+    points = _ground(views.optics.figures(state.theta), views, 0.0)
     ahead = _turned(there.slope, -there.heading)
     columns = []
     for name in names:
@@ -105,8 +104,7 @@ def camera_slopes(views: Views, state: State, there: Projection, names: Sequence
 def pose_slopes(there: Projection) -> Floats:
     """Slopes of the residuals by the robot's x, y and heading (n, 3)."""
     slope, lever = there.slope, there.lever
-    turning = slope[:, 1] * lever[:, 0] - slope[:, 0] * lever[:, 1]
-    return np.column_stack((slope, turning))
+    return np.column_stack((slope, slope[:, 1] * lever[:, 0] - slope[:, 0] * lever[:, 1]))
 
 
 def map_slopes(views: Views, state: State, there: Projection) -> Floats:

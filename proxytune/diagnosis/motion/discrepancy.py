@@ -254,8 +254,7 @@ def _fit_curves(task: _Task, patient: bool) -> tuple[Theta, Mapping[str, float],
         given, errors = _linearise(drives, {**task.theta, **now}, offered, moving, chosen.weights[kept])
     fold = np.arange(_parts(drives)) % FOLDS
     without = [given.only(np.flatnonzero(fold != one)) for one in range(FOLDS)]
-    folds = [stepped(choose(some)) for some in without]
-    return stepped(chosen), chosen.gains, folds
+    return stepped(chosen), chosen.gains, [stepped(choose(some)) for some in without]
 
 
 def _theta(offer: Learnt, choice: ChosenGroups) -> dict[str, float]:

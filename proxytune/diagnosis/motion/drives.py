@@ -160,8 +160,7 @@ Whole = NDArray[Any]
 
 def rows_at(signals: Floats, row: Whole, sample: Whole) -> Floats:
     """Samples (…, channels) of signals (P, T, channels); a fifth of the time that indices side by side take."""
-    flat = signals.reshape(-1, signals.shape[-1])
-    return np.asarray(flat.take(row * signals.shape[1] + sample, axis=0))
+    return np.asarray(signals.reshape(-1, signals.shape[-1]).take(row * signals.shape[1] + sample, axis=0))
 
 
 def path_between(walked: Floats, path: Whole, tick: Floats) -> Floats:
@@ -375,8 +374,7 @@ def _at_start(given: Commands, episode: LogEpisode, samples: Whole, robot: Robot
     moved = relative(poses[::2], poses[1::2]) / np.diff(times[at])[::2, None]
     turn = moved[:, 2] * figures["effective_baseline"] / 2.0
     first, later = np.stack((moved[:, 0] - turn, moved[:, 0] + turn), axis=1) / figures["full_speed"]
-    fast = float(np.abs(first).max())
-    in_motion = fast > max(IN_MOTION, STEADY * float(np.abs(later).max()))
+    in_motion = float(np.abs(first).max()) > max(IN_MOTION, STEADY * float(np.abs(later).max()))
     return np.clip(first, -1.0, 1.0) if in_motion else given.rest
 
 
@@ -421,8 +419,7 @@ def sum_by(labels: Whole, values: Floats, count: int, weights: Floats | None = N
     own = labels >= 0
     share = np.ones(own.sum()) if weights is None else weights[own]
     rows = sparse.csc_array((share, labels[own], np.append(0, np.cumsum(own))), shape=(count, len(labels)))
-    flat = values.reshape(len(values), -1)
-    return np.asarray(rows @ flat).reshape(count, *values.shape[1:])
+    return np.asarray(rows @ values.reshape(len(values), -1)).reshape(count, *values.shape[1:])
 
 
 def number_of(labels: Whole) -> Whole:
@@ -447,8 +444,7 @@ def robot_of(log: Log, name: str | None = None, catalogue: Catalogue = SHIPPED) 
     if is_robot(log.robot, catalogue.folder) or name not in (None, log.robot):
         robot = read_robot(name or log.robot, catalogue.folder)
         return replace(robot, catalogue=replace(catalogue, drive=robot.drive))
-    missing = [key for figure, key in NEEDED.items() if figure not in log.geometry]
-    if missing:
+    if missing := [key for figure, key in NEEDED.items() if figure not in log.geometry]:
         unknown = f"{log.name}: robot '{log.robot}' is unknown ({nearest(log.robot, robot_names(catalogue.folder))})"
         lacks = f"log.toml does not state {' and '.join(missing)}"
         raise LogError(f"{unknown} and {lacks}; state them, or name a robot with --robot")

@@ -131,8 +131,7 @@ def _blocks(drives: Drives, variances: Floats) -> tuple[Floats, Floats]:
     own = np.zeros((len(lever), 3, 3))
     own[:, :2, :2] = turn * lever[:, :, None] * lever[:, None, :]
     own[:, :2, 2] = own[:, 2, :2] = -turn * lever
-    drive = variances[:3] * way[:, None] + 2.0 * np.array((place, place, turn))
-    own[:, range(3), range(3)] += drive
+    own[:, range(3), range(3)] += variances[:3] * way[:, None] + 2.0 * np.array((place, place, turn))
     shared = np.zeros_like(own)
     back = np.roll(measured[:, 2], 1)
     cosine, sine = np.cos(back), np.sin(back)

@@ -43,8 +43,7 @@ def find_period(drives: Drives, theta: Theta) -> Period | None:
     times = (drives.first + drives.last) / 2.0 / drives.tick_hz
     driven = np.bincount(drives.episode, drives.last - drives.first)
     seconds = float(np.median(driven[driven > 0])) / drives.tick_hz
-    lowest = max(LOWEST_HZ, FEWEST / seconds)
-    lines = np.arange(lowest, HARMONICS * HIGHEST_HZ, 0.25 / seconds)
+    lines = np.arange(max(LOWEST_HZ, FEWEST / seconds), HARMONICS * HIGHEST_HZ, 0.25 / seconds)
     if len(lines) < 2 * ROUND:
         return None
     behind = (asked - drives.measured[:, 0]) * np.sign(asked)

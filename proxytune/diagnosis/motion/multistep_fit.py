@@ -115,8 +115,7 @@ def _problem(drives: Drives, theta: Theta, free: tuple[Coordinate, ...], windows
 
     def residuals(fractions: Floats) -> Floats:
         def make() -> Floats:
-            apart = predicted_motion(drives, at(fractions), windows) - measured
-            misses = np.asarray((apart * weights).ravel())
+            misses = np.asarray(((predicted_motion(drives, at(fractions), windows) - measured) * weights).ravel())
             misses.setflags(write=False)
             return misses
 

@@ -245,8 +245,7 @@ def _rows(episode: LogEpisode, starts: Whole, poses: Floats) -> pd.DataFrame:
     covered = starts[:, None] + np.arange(poses.shape[1])
     inside = covered < len(episode.times)
     known = np.minimum(covered, len(episode.times) - 1)
-    after = as_measured(episode)[1]
-    stamps = episode.times + after
+    stamps = episode.times + as_measured(episode)[1]
     if episode.measured is not None:
         inside &= np.isin(known, episode.measured.rows)
         stamps[episode.measured.rows] = episode.measured.times

@@ -71,8 +71,7 @@ def random_effects(fitted: Fit, seed: int) -> tuple[RandomEffect, ...]:
     answered = responses(fitted, np.stack([np.roll(z, shift, axis=0).ravel() for shift in shifts], axis=1))
     if len(answered.size) == 0:
         return ()
-    rate = fitted.drives.rate_hz
-    return tuple(_weigh(name, draws, rate, answered) for name, draws in RANDOM_EFFECTS.items())
+    return tuple(_weigh(name, draws, fitted.drives.rate_hz, answered) for name, draws in RANDOM_EFFECTS.items())
 
 
 def _weigh(effect: str, draws: Draws, rate_hz: float, answered: Responses) -> RandomEffect:
@@ -138,9 +137,8 @@ def _ratios(late: Lateness, gradient: Floats, energy: Floats) -> Floats:
 
 def responses(fitted: Fit, others: Floats) -> Responses:
     """Replay the drives with each command lost, and see what changes, and what would of other innovations."""
-    drives = fitted.drives
     # Commands far apart are lost together, so that one replay tells of many.
-    changed, phase = _changed_commands(drives)
+    changed, phase = _changed_commands(fitted.drives)
     values = np.concatenate((fitted.innovations[:, None], others), axis=1)
     heard = values, values**2
     found = [_respond_to_phase(fitted, changed[phase == number], *heard) for number in np.unique(phase)]

@@ -155,8 +155,7 @@ def with_dense_probes(base: Fit, forms: Sequence[Candidate]) -> list[Candidate]:
 
 def _places(drives: Drives, form: Candidate) -> list[tuple[float, ...]]:
     """Patches round places that were driven through, their first coordinate at its middle probe."""
-    cells = np.round(drives.poses[:, 0, :2] / CELL_M)
-    found, often = np.unique(cells, axis=0, return_counts=True)
+    found, often = np.unique(np.round(drives.poses[:, 0, :2] / CELL_M), axis=0, return_counts=True)
     places = found[np.argsort(-often, kind="stable")[:MOST_PLACES]] * CELL_M
     size = form.probes[len(form.probes) // 2][0]
     return [(size, x, y, radius) for (x, y), radius in product(places.tolist(), RADII_M)]

@@ -274,8 +274,7 @@ def _is_everywhere(one: FittedCandidate) -> bool:
     if trace is None or not trace.placed:
         return False
     _, x, y, radius = (one.fitted.theta[name] for name in drives.robot.catalogue.theta_names(name))
-    places = drives.poses[:, 0, :2]
-    return float((np.hypot(*(places - (x, y)).T) < radius).mean()) > drives.rules.patch_share
+    return float((np.hypot(*(drives.poses[:, 0, :2] - (x, y)).T) < radius).mean()) > drives.rules.patch_share
 
 
 def _is_plain_form_of(one: FittedCandidate, best: FittedCandidate) -> bool:
@@ -310,8 +309,7 @@ def _contained(drives: Drives, effect: str) -> tuple[str, ...]:
 def _is_at_edge(one: FittedCandidate) -> bool:
     """Tell whether one of its values was fitted to an end of its range: the effect then stands for something else."""
     free = one.screened.candidate.free if one.screened else ()
-    drives = one.fitted.drives
-    return any(at_edge(name, one.fitted.theta[name], drives) for names in free for name in names)
+    return any(at_edge(name, one.fitted.theta[name], one.fitted.drives) for names in free for name in names)
 
 
 def _fitted(model: Fit, effect: FittedCandidate | RandomEffect) -> FittedCandidate:

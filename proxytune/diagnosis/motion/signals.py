@@ -153,11 +153,10 @@ def _steering(motion: _Motion) -> _Signal:
 
 
 def _transients(motion: _Motion) -> _Signal:
-    rate = motion.drives.tick_hz
     parts = []
     for side in range(2):
         command = motion.commands[..., side]
-        slow = [lagged(command, seconds * rate) for seconds in (0.05, 0.15, 0.45, 1.2)]
+        slow = [lagged(command, seconds * motion.drives.tick_hz) for seconds in (0.05, 0.15, 0.45, 1.2)]
         parts.append(np.stack([command - slow[0]] + [a - b for a, b in pairwise(slow)], axis=-1))
     full = motion.drives.robot.figures["full_speed"]
     signal = parts[0].sum(axis=-1)
@@ -173,8 +172,7 @@ def _after_reversal(motion: _Motion) -> _Signal:
     for speed in (motion.left, motion.right):
         gone = _since_reversal(speed) / motion.drives.tick_hz
         columns.append(np.stack([np.exp(-gone / reach) for reach in (0.005, 0.015, 0.04, 0.12)], -1) * speed[..., None])
-    signal = _since_reversal(motion.left) / motion.drives.tick_hz
-    return Cue.REVERSAL, signal, "m", _of_wheels(motion, *columns)
+    return Cue.REVERSAL, _since_reversal(motion.left) / motion.drives.tick_hz, "m", _of_wheels(motion, *columns)
 
 
 def _since_reversal(speed: Floats) -> Floats:
@@ -284,8 +282,7 @@ def _fit_with_own_noise(fitted: Fit, curve: SignalCurve, plain: float) -> Signal
 
 
 def _fit_curve(fitted: Fit, group: SignalGroup, changes: Floats, plain: float) -> SignalCurve:
-    columns = fitted.whiten.whiten(changes)
-    both = np.concatenate((fitted.slopes, columns), axis=1)
+    both = np.concatenate((fitted.slopes, fitted.whiten.whiten(changes)), axis=1)
     size = np.sqrt((both**2).sum(axis=0)) + 1e-12
     unit = both / size
     sums = derivatives_by_block(fitted, unit)

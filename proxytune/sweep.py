@@ -142,8 +142,7 @@ def discrepancy_study(study: Study, model: Path) -> Study:
         raise InputError(f"--target-model: {lacks}; leave the option out")
     target: Any = load_family(study.settings, model)
     both = Discrepancy(proxy, target)
-    settings = replace(study.settings, agents=study.settings.agents[:1])
-    return Study(settings, both, study.target, both.identity)
+    return Study(replace(study.settings, agents=study.settings.agents[:1]), both, study.target, both.identity)
 
 
 RESAMPLES = 1000

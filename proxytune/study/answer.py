@@ -71,15 +71,13 @@ def run_stages(run: StudyRun, warn: Callable[[str], None], known: Sequence[Outco
 
 def _attach(run: StudyRun, known: Sequence[Outcome | Theta]) -> None:
     """Keep outcomes, and open a trial for each θ that has none yet: what is open is not proposed."""
-    outcomes = [one for one in known if isinstance(one, Outcome)]
-    if outcomes:
+    if outcomes := [one for one in known if isinstance(one, Outcome)]:
         run.store.save_outcome(run.study.identity, *outcomes)
     trials = [*run.finished_trials(), *run.open_trials()]
     tried = {instance_of(trial.theta) for trial in trials}
     wanted = (dict(one.episode.theta) if isinstance(one, Outcome) else one for one in known)
     new = [one for key, one in {instance_of(theta): theta for theta in wanted}.items() if key not in tried]
-    opened = [TrialRecord(number, dict(theta)) for number, theta in enumerate(new, start=len(trials) + 1)]
-    if opened:
+    if opened := [TrialRecord(number, dict(theta)) for number, theta in enumerate(new, start=len(trials) + 1)]:
         run.save_trials(*opened)
 
 
@@ -269,8 +267,7 @@ def _learn_again(run: StudyRun, learnt: Knowledge, driven: Sequence[Finalist]) -
     # A family that draws nothing does the same again, which tells nothing.
     told = {(one.values, one.outcome) for one in learnt.trials}
     new = {(one.values, one.outcome): one for one in fresh}
-    again = [one for key, one in new.items() if key not in told]
-    return run.learn([*learnt.trials, *again], learnt.goal)
+    return run.learn([*learnt.trials, *(one for key, one in new.items() if key not in told)], learnt.goal)
 
 
 def _answer(driven: Sequence[Finalist], learnt: Knowledge, again: Knowledge) -> Finalist:

@@ -147,8 +147,7 @@ def known_trials(run: StudyRun) -> tuple[Trial, ...]:
 def _copied(run: StudyRun, key: str) -> list[Trial]:
     """The trials that the store holds for a key, with the outputs of this study's agents and metrics."""
     table, fact = run.study.target, COPIED[key]
-    learnt = run.store.facts().get(fact)
-    if learnt is None:
+    if (learnt := run.store.facts().get(fact)) is None:
         raise StoreError(f"{run.store.path}: has nothing of {key} yet; run the study first")
     try:
         rows = [learnt["agents"].index(agent) for agent in table.agents]

@@ -107,8 +107,7 @@ class ComparedFamilies:
                 return False
             return one.more.low is None or one.more.low <= 0.0
 
-        best = best_teaching_family(self.lessons)
-        if best is None:
+        if (best := best_teaching_family(self.lessons)) is None:
             return BestFamilies()
         others = [name for name, one in self.lessons.items() if name != best and may_be_as_good(one)]
         return BestFamilies(best, tuple(others))

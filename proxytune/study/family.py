@@ -90,8 +90,7 @@ def _check_signature(settings: StudySettings, factory: Any, model: Path | None) 
 
 
 def _check(settings: StudySettings, family: DomainFamily) -> None:
-    lacks = [member for member in (*MEMBERS, *METHODS) if not has_member(family, member)]
-    if lacks:
+    if lacks := [member for member in (*MEMBERS, *METHODS) if not has_member(family, member)]:
         raise settings.error("family", f"{settings.family} made no domain family: it lacks {', '.join(lacks)}")
     for member, (kind, word) in MEMBERS.items():
         what, refuse = f"{member} of {settings.family}", functools.partial(settings.error, "family")

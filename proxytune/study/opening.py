@@ -72,8 +72,7 @@ def read_target(settings: StudySettings, family: DomainFamily) -> tuple[ScoreTab
     compared = [metric.name for metric in settings.metrics]
     # What a search can learn from at no cost
     others = [name for name in family.metrics if name not in compared and has_in_full(name)]
-    table = _read(settings, [*compared, *others])
-    chosen = table.arrange(agents=settings.agents)
+    chosen = _read(settings, [*compared, *others]).arrange(agents=settings.agents)
     driven = [label for column, label in enumerate(chosen.episodes) if chosen.driven[:, column].any()]
     wanted = {str(start) for start in range(settings.starts)}
     own = [label for label in driven if start_of(label) in wanted]
@@ -244,8 +243,7 @@ def _engine(settings: StudySettings) -> Engine:
         raise settings.error("engine", str(problem)) from None
     if not engine.in_studies:
         raise settings.error("engine", f"'{engine.name}' is for `compare` only; {nearest(engine.name, ENGINE_NAMES)}")
-    reason = why_not_engine(engine, composed=settings.objective != LEARNING)
-    if reason:
+    if reason := why_not_engine(engine, composed=settings.objective != LEARNING):
         raise settings.error("engine", reason)
     if settings.low_fidelity and (engine.learns_from == "scores" or engine.name not in ENGINE_NAMES):
         told = f"engine '{engine.name}' cannot tell a cheaper proxy's trials from this one's; take 'outcomes'"

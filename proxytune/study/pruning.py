@@ -102,8 +102,7 @@ def run_or_prune(
 
 def rescored_pruned(run: StudyRun, trial: TrialRecord) -> TrialRecord:
     """Score a pruned trial by the study's metrics, if others had led to its end."""
-    outcomes = run.known(run.episodes_of(trial)).values()
-    worked = [outcome for outcome in outcomes if outcome.metrics is not None]
+    worked = [outcome for outcome in run.known(run.episodes_of(trial)).values() if outcome.metrics is not None]
     bound = float(disagreement_of(run.study, score_table(worked), trial.decided).sum())
     driven, agents = len(trial.decided), len(run.settings.agents)
     # Every other pair is taken for one like theirs; beside a tolerance in percent the bound is only nearly one.

@@ -192,8 +192,7 @@ def _misfit_caution(learnt: Knowledge) -> str:
 def _overran(run: StudyRun) -> str:
     """What a time limit made fail, in one line; empty if nothing."""
     store, study = run.store, run.study
-    late = store.failed_by(study.identity, ENDLESS)
-    if not late:
+    if not (late := store.failed_by(study.identity, ENDLESS)):
         return ""
     agents = ", ".join(f"'{agent}'" for agent in sorted({episode.agent for episode in late}))
     again = late & store.failed_in_other_code(study.identity, study.code)

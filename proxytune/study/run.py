@@ -57,8 +57,7 @@ def goal_of(run: StudyRun) -> search.Goal:
 
 def knowledge_of(run: StudyRun, done: Iterable[TrialRecord]) -> search.Knowledge:
     """All that finished trials say of θ, those of earlier studies too."""
-    trials = [*known_trials(run), *(run.search_trial(trial) for trial in done)]
-    return run.learn(trials, goal_of(run))
+    return run.learn([*known_trials(run), *(run.search_trial(trial) for trial in done)], goal_of(run))
 
 
 def run_trials(run: StudyRun, proposer: search.Proposer) -> None:
@@ -151,9 +150,8 @@ def came_to(trial: TrialRecord, objective: Objective) -> str:
 def record(number: int, evaluation: Evaluation) -> TrialRecord:
     """A trial as the store keeps it, from what its episodes came to."""
     state: State = "failed" if evaluation.failure else "finished"
-    score, measures = evaluation.score, evaluation.measures if state == "finished" else {}
-    failed = len(evaluation.failures)
-    return TrialRecord(number, evaluation.theta, state, score, measures, failed, evaluation.failure)
+    measures, failed = evaluation.measures if state == "finished" else {}, len(evaluation.failures)
+    return TrialRecord(number, evaluation.theta, state, evaluation.score, measures, failed, evaluation.failure)
 
 
 def stopped(run: StudyRun, done: Sequence[TrialRecord]) -> str:

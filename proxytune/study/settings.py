@@ -129,8 +129,7 @@ def _overlaid(read: Section, table: Section, family: str, name: str) -> Section:
     alike = table.text("family", family) == family
     kept = {key: value for key, value in read.values.items() if alike or key not in OF_ONE_FAMILY}
     own = {key: table.values[key] for key in ("family", "proxy", "parameters") if key in table.values}
-    domain: Mapping[str, Any] = {**kept.get("domain", {}), **table.section("domain").values}
-    values = {**kept, **own, "domain": domain, "name": name}
+    values = {**kept, **own, "domain": {**kept.get("domain", {}), **table.section("domain").values}, "name": name}
     return Section(read.path, f"{table.name.removesuffix('.')}: ", {k: v for k, v in values.items() if k != FAMILIES})
 
 
@@ -230,8 +229,7 @@ def read_study_settings(path: Path) -> StudySettings:
     Raises:
         SettingsError: With file, key and remedy.
     """
-    around = study_around(path, FILE_NAME)
-    if around is not None:
+    if (around := study_around(path, FILE_NAME)) is not None:
         study, name = read_study_settings(around), path.absolute().name
         if name not in study.families:
             raise study.error(FAMILIES, f"has no '{name}', as {path} is called; {nearest(name, study.families)}")

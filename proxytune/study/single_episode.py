@@ -65,8 +65,7 @@ def check_episode(family: DomainFamily, agent: str, theta: Theta, start: int) ->
     # A model.toml checks its learnt curves where it is read; a family that is built of effects drives them.
     named = {name: value for name, value in theta.items() if not (is_learnt(name) and hasattr(family, "effects"))}
     for name, value in named.items():
-        known = family.parameters.get(name)
-        if known is None:
+        if (known := family.parameters.get(name)) is None:
             raise InputError(f"θ: unknown parameter '{name}'; {parameter_hint(name, family.parameters)}")
         if not known.low <= value <= known.high:
             raise InputError(f"θ: {name} must lie within [{known.low:g}, {known.high:g}], got {value:g}")
@@ -165,8 +164,7 @@ def drive_side_by_side(
     """
     unit, road = getattr(proxy, "command_unit", ""), getattr(proxy, "road_to_draw", None)
     there = None if target is None else record_episode(target, replace(episode, theta=()), filmed=filmed)
-    here = record_episode(proxy, episode, filmed=filmed)
-    return SideBySide(episode, proxy.metrics, unit, road, here, there)
+    return SideBySide(episode, proxy.metrics, unit, road, record_episode(proxy, episode, filmed=filmed), there)
 
 
 def check_robot(family: DomainFamily, model: Path, option: str) -> None:

@@ -357,9 +357,8 @@ class StudyRun:
         return self._trials[trial.number]
 
     def _lacks_episodes(self, trial: TrialRecord) -> RunError:
-        path = self.store.path
         again = f"drive them again: python -m proxytune study {self.settings.home}"
-        return RunError(f"{path}: lacks episodes of trial {trial.number}; {again}")
+        return RunError(f"{self.store.path}: lacks episodes of trial {trial.number}; {again}")
 
 
 MOST_TRIALS, MOST_JOBS = 100_000, 1024

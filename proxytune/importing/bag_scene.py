@@ -91,8 +91,7 @@ def read_chain(transforms: dict[str, Transform], name: str, stamps: str, where: 
     Other moving transforms are interpolated to these times; poses outside of what they cover are left out.
     """
     parent, _, child = name.partition(">")
-    chain = _chain(transforms, parent, child)
-    if not chain:
+    if not (chain := _chain(transforms, parent, child)):
         raise LogError(f"{where}: no transforms lead from '{parent}' to '{child}'; {_remedy(transforms)}")
     if not any(transform.moves for transform in chain):
         raise LogError(f"{where}: {name} never moves; {_remedy(transforms)}")

@@ -218,8 +218,7 @@ SMOOTH_S = 0.1
 
 def lag_of(drive: Drive) -> float | None:
     """The lag of measured behind commanded turning [s], below 0 where it comes before; None where nothing tells it."""
-    commands = drive.commands
-    if commands is None:
+    if (commands := drive.commands) is None:
         return None
     times = np.arange(drive.poses.times[0], drive.poses.times[-1], STEP_S)
     if len(times) * STEP_S < 3.0 * FURTHEST_S:

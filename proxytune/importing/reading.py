@@ -54,8 +54,7 @@ def survey(drive: Drive) -> Survey:
 def clock_notes(drives: Sequence[Survey]) -> list[str]:
     """Tell what the lags say of the clocks of commands and poses, in a sentence."""
     lags = [(one.lag_s, one.name) for one in drives if one.lag_s is not None]
-    early = [pair for pair in lags if pair[0] < 0.0]
-    if early:
+    if early := [pair for pair in lags if pair[0] < 0.0]:
         lag, first = min(early)
         turn = f"{len(early)} of {len(drives)} drives turn before they are told to (up to {-lag:.2f} s, {first})"
         remedy = "diagnose corrects that, --clock-offset declares it"

@@ -54,8 +54,7 @@ def find_commands(path: Path, wanted: Wanted) -> Path | None:
         return None
     if wanted.commands:
         places = (Path(wanted.commands), path.parent / wanted.commands)
-        found = next((place for place in places if place.is_file()), None)
-        if found is None:
+        if (found := next((place for place in places if place.is_file()), None)) is None:
             raise LogError(f"{wanted.commands}: no such file of commands; check the path given with --commands")
         return found
     stems = (*(f"{path.stem}_{stem}" for stem in STEMS), *STEMS)
@@ -91,8 +90,7 @@ def share_commands(path: Path, known: CommandsOf, drives: Sequence[Drive], label
             raise LogError(f"{path}: drive '{name}' has no poses; {nearest(name, driven)}")
     shared = []
     for drive, label in zip(drives, labels, strict=True):
-        commands = known.get(drive.name) or known.get(label)
-        if commands is None:
+        if (commands := known.get(drive.name) or known.get(label)) is None:
             raise LogError(f"{path}: has no commands for drive '{drive.name}'; add them, or leave its poses out")
         shared.append(replace(drive, commands=commands))
     return shared
@@ -300,8 +298,7 @@ def _read_one(path: Path, wanted: Wanted) -> Source:
     source = Source("TUM trajectory", (drive,), tuple(channels_of(table, columns)), (f"Poses: {described(columns)}.",))
     if "none" in (wanted.commands, wanted.kind):
         return source
-    file = find_commands(path, wanted)
-    if file is None:
+    if (file := find_commands(path, wanted)) is None:
         lay = f"lay {path.stem}_commands.csv (time, v, omega) beside it, name another file with --commands FILE"
         none = "or write --commands none for a log without them"
         raise LogError(f"{path}: a TUM file holds no commands; {lay}, {none}")

@@ -149,8 +149,7 @@ def _take_header(path: Path, comments: Lines, lines: Lines) -> tuple[str, list[s
 
 def _names(path: Path, number: int, cells: list[str]) -> list[str]:
     names = [cell or f"column {place}" for place, cell in enumerate(cells, start=1)]
-    repeated = [name for name, count in Counter(names).items() if count > 1]
-    if repeated:
+    if repeated := [name for name, count in Counter(names).items() if count > 1]:
         raise LogError(f"{path}: line {number}: names the column '{repeated[0]}' twice; rename one of them")
     return names
 

@@ -101,8 +101,7 @@ def choose(topics: tuple[Topic, ...], wanted: Wanted, where: str) -> Choice:
         raise LogError(f"{_nothing(COMMAND_ROLE, topics, where)}, or take a log without commands by --commands none")
     transform = wanted.poses if ">" in wanted.poses else ""
     role = replace(POSE_ROLE, ranks={"TFMessage": 0, "tfMessage": 0}) if transform else POSE_ROLE
-    poses = _choose(role, topics, "" if transform else wanted.poses, where)
-    if poses is None:
+    if (poses := _choose(role, topics, "" if transform else wanted.poses, where)) is None:
         raise LogError(_nothing(role, topics, where))
     pictures = None if wanted.frames == "none" else _choose(PICTURE_ROLE, topics, wanted.frames, where)
     kind = "none" if commands is None else _kind_of(commands, wanted.kind, where)
@@ -135,8 +134,7 @@ def _choose(role: Role, topics: tuple[Topic, ...], name: str, where: str) -> Top
     if not name:
         return min(filter(role.is_offered, topics), key=role.order, default=None)
     named = {topic.name: topic for topic in topics}
-    topic = named.get(name) or named.get(f"/{name}")
-    if topic is None:
+    if (topic := named.get(name) or named.get(f"/{name}")) is None:
         raise LogError(f"{where}: no topic '{name}'; {nearest(name, named)}")
     if not role.can_be(topic):
         raise LogError(f"{where}: topic {topic.name} cannot be {role.name}: {role.why_not(topic)}")
@@ -154,8 +152,7 @@ def _kind_of(topic: Topic, wanted: str, where: str) -> str:
 
 
 def _nothing(role: Role, topics: tuple[Topic, ...], where: str) -> str:
-    left = [topic.name for topic in topics if role.can_be(topic)]
-    if left:
+    if left := [topic.name for topic in topics if role.can_be(topic)]:
         return f"{where}: no topic is plainly {role.name}; name one of {', '.join(left)} by {role.option}"
     return f"{where}: no topic has {role.name}, which are messages of type {', '.join(role.ranks)}; record one"
 
@@ -169,8 +166,7 @@ def _part(topic: Topic, choice: Choice) -> str:
         return POSE_ROLE.name
     if choice.commands is not None and choice.commands.kind == VESC and topic.name == servo_of(choice.commands.name):
         return COMMAND_ROLE.name
-    fitting = [role for role, _ in roles if role.is_offered(topic)]
-    if fitting:
+    if fitting := [role for role, _ in roles if role.is_offered(topic)]:
         return f"left out: could be {fitting[0].name} as well ({fitting[0].option})"
     near = [role for role, _ in roles if short(topic.kind) in role.ranks]
     return f"left out: {near[0].why_not(topic)}" if near else "left out: neither commands, poses nor pictures"

@@ -192,8 +192,7 @@ def _commanded(log: Log, figures: Figures) -> list[tuple[Floats, Floats]]:
 
 def _turning(log: Log, drives: list[Chords]) -> Iterator[str]:
     """Tell where it turns the other way than its commands ask, or by the command that is not for turning."""
-    asked = _commanded(log, {})
-    strongest, gain = _correlation(log, drives, [turn for _, turn in asked])
+    strongest, gain = _correlation(log, drives, [turn for _, turn in _commanded(log, {})])
     if strongest > AGAINST and log.command == "twist" and not SLOWEST_TURN < gain < FASTEST_TURN:
         yield f"the robot turns {gain:.2g} times as fast as its commands say: check the unit of omega, rad/s"
     if strongest < -AGAINST:

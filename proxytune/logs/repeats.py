@@ -97,8 +97,7 @@ def rows_of_poses(log: Log, episodes: Sequence[LogEpisode]) -> list[Whole]:
 def repeats_note(log: Log) -> Iterator[str]:
     """Tell of poses that repeat while the robot moves, a sentence at most."""
     every = [runs_of(episode) for episode in log.episodes]
-    share = _share(every, _least_speed(every))
-    if share >= USUAL:
+    if (share := _share(every, _least_speed(every))) >= USUAL:
         fresh = sum(len(runs.counts) for runs in every) / sum(len(runs.known) for runs in every)
         repeat = f"{100.0 * share:.0f} % of the poses repeat the one before to the last digit while the robot moves"
         measured = f"about {fresh * log.poses_hz:.2g} a second are measured"

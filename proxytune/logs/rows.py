@@ -125,8 +125,7 @@ def read_rows(
     _check_episodes(rows, fewest)
     for name in parts[0].values:
         # The first cell of the first column that has any which is no number
-        wrong = next((part.wrong[name] for part in parts if name in part.wrong), None)
-        if wrong:
+        if wrong := next((part.wrong[name] for part in parts if name in part.wrong), None):
             allowed = ", or empty where nothing was measured" if name in may_lack else ""
             line, text = wrong
             raise LogError(f"{path}: line {line}, column '{name}': must be a finite number{allowed}, got '{text}'")

@@ -103,9 +103,8 @@ def unwrapped(samples: Rows) -> Floats:
     measured = np.flatnonzero(np.isfinite(heading))
     if not len(measured):
         return heading
-    episode = samples.episode[measured]
     turns = np.append(0.0, np.rint(np.diff(heading[measured]) / math.tau)).cumsum()
-    begins = np.append(True, np.diff(episode) > 0)
+    begins = np.append(True, np.diff(samples.episode[measured]) > 0)
     start = turns[np.maximum.accumulate(np.where(begins, np.arange(len(measured)), 0))]
     heading[measured] -= (turns - start) * math.tau
     return heading
@@ -126,8 +125,7 @@ def episodes_on_grid(
     filled = np.zeros(int(ends[-1]), dtype=np.int64)
     filled[places] = np.arange(len(places))
     held = commands[np.maximum.accumulate(filled)]
-    placed = np.column_stack((samples.columns(POSE[:2]), unwrapped(samples)))
-    poses = spread(placed, places, len(filled))
+    poses = spread(np.column_stack((samples.columns(POSE[:2]), unwrapped(samples))), places, len(filled))
     wheels = spread(samples.columns(WHEELS), places, len(filled)) if WHEELS[0] in samples.values else None
     each = zip(samples.names, np.split(samples.values["time"], samples.firsts[1:]), (0, *ends[:-1]), ends, strict=True)
     episodes = []
@@ -150,8 +148,7 @@ REACH_S = 0.1
 def usual_rate(samples: Rows) -> float:
     """Measured poses a second, drop-outs and gaps apart."""
     known = np.isfinite(samples.values["x"])
-    times, episode = samples.values["time"][known], samples.episode[known]
-    between = np.diff(times)[np.diff(episode) == 0]
+    between = np.diff(samples.values["time"][known])[np.diff(samples.episode[known]) == 0]
     if not len(between):
         raise LogError(f"{samples.path}: no drive has two measured poses; nothing can be learnt from it")
     periods = np.rint(between / np.median(between))

@@ -45,8 +45,7 @@ def is_form(path: Path) -> bool:
 def form_rows(path: Path, domain: str | None = None) -> tuple[list[str], list[Line]]:
     """The columns and rows of a folder, a JSON file or a Python file, of which `domain` is the dictionary."""
     if path.is_dir():
-        files = sorted(path.glob("*/eval_info.json")) or sorted(path.glob("*.json"))
-        if not files:
+        if not (files := sorted(path.glob("*/eval_info.json")) or sorted(path.glob("*.json"))):
             raise ScoresError(f"{path}: cannot be read, a folder without AGENT/eval_info.json; name a table")
         return _table(path, [row for file in files for row in _json_rows(file)])
     if path.suffix.lower() == ".py":

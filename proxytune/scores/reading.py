@@ -44,8 +44,7 @@ class Cells:
 
     def label(self, name: str) -> Sequence[str]:
         """The labels of this kind, one per row; empty ones where the file has no such column."""
-        labels = self.cells.get(name)
-        if labels is None:
+        if (labels := self.cells.get(name)) is None:
             return [""] * len(self.lines)
         if "" in labels:
             line = self.lines[labels.index("")]
@@ -317,8 +316,7 @@ def read_domains(
     for name, theirs in (columns or {}).items():
         if not any(theirs in cells.named for cells in files):
             raise ScoresError(f"{files[0].path}: no column '{theirs}' for '{name}'; {nearest(theirs, files[0].named)}")
-    bare = next((cells for cells in files if not cells.lines), None)
-    if bare:
+    if bare := next((cells for cells in files if not cells.lines), None):
         raise ScoresError(f"{bare.path}: has no rows; add one per agent and episode")
     domain, agent, episode = (
         [one for cells in files for one in cells.label(name)] for name in ("domain", "agent", "episode")

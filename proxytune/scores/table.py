@@ -83,8 +83,7 @@ class Metric:
 
 def varies(columns: Floats) -> NDArray[np.bool_]:
     """True if agents differ in a metric by more than rounding: one value per agent on the last axis but one."""
-    largest = np.abs(columns).max(axis=-2)
-    return np.asarray(np.ptp(columns, axis=-2) > ROUNDING * largest, dtype=np.bool_)
+    return np.asarray(np.ptp(columns, axis=-2) > ROUNDING * np.abs(columns).max(axis=-2), dtype=np.bool_)
 
 
 LARGEST = 1e70

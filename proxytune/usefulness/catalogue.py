@@ -96,8 +96,7 @@ class Measure:
         names = [metric.name for metric in inputs.metrics] if self.per_metric else [ALL]
         ends: Sequence[Ends | None] = [None] * len(names)
         if assessment.intervals is not None:
-            resamples = assessment.prpv_interval.resamples
-            means = bootstrap_means(inputs, resamples=resamples, seed=assessment.seed)
+            means = bootstrap_means(inputs, resamples=assessment.prpv_interval.resamples, seed=assessment.seed)
             ends = [interval_where_defined(one) for one in in_blocks(by_metric, *means).T]
         values = [None if np.isnan(value) else float(value) for value in by_metric(*inputs.means)]
         return dict(zip(names, map(Measured, values, ends), strict=True))

@@ -197,8 +197,7 @@ def _again(table: ScoreTable, donors: Donors, rng: np.random.Generator, columns:
     driven = table.driven
     values = np.full((DRAWS, *table.values.shape), np.nan)
     values[:, driven] = donors.again(table.values[driven], rng)
-    taken = np.take_along_axis(values, columns[:, None, :, None], axis=2)
-    return np.asarray(np.nanmean(taken, axis=2))
+    return np.asarray(np.nanmean(np.take_along_axis(values, columns[:, None, :, None], axis=2), axis=2))
 
 
 def _perfect(sides: Comparison, donors: Donors, rng: np.random.Generator) -> Floats:

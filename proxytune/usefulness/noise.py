@@ -60,8 +60,7 @@ def noise_floor(*, target: ScoreTable, metrics: Sequence[Metric], splits: int = 
     halves of the episodes, and with them of the starts. Where all agents drove the same episodes, all are split alike.
     """
     chosen = compare(proxy=target, target=target, metrics=metrics).target
-    reason = resampling.too_few(chosen, "on the target")
-    if reason:
+    if reason := resampling.too_few(chosen, "on the target"):
         return NoiseFloor("none", reason=reason)
     same_starts = is_repeated(chosen)
     rng, places = np.random.default_rng(seed), start_places(chosen)

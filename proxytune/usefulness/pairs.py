@@ -78,8 +78,7 @@ def prpv_of_means(proxy: Floats, target: Floats, metrics: Sequence[Metric]) -> F
     if proxy.shape[-2] > FEW_AGENTS:
         return by_table(lambda one, other: prpv_of_table(one, other, metrics), proxy, target)
     # Each pair counts half in either order.
-    difference = np.abs(_signs(proxy, metrics) - _signs(target, metrics))
-    return np.asarray(difference.sum(axis=-1), dtype=np.float64)
+    return np.asarray(np.abs(_signs(proxy, metrics) - _signs(target, metrics)).sum(axis=-1), dtype=np.float64)
 
 
 def dominance(means: Floats, metrics: Sequence[Metric]) -> Floats:
@@ -215,8 +214,7 @@ def kendall_of_table(proxy: Floats, target: Floats) -> Floats:
         concordant = 0
         for block in blocks(len(proxy)):
             below, sets = one.sets(block)[one.below], other.sets(block)
-            discordant = below & ~sets[other.reach]
-            concordant += 2 * (count(below & sets[other.below]) - count(discordant))
+            concordant += 2 * (count(below & sets[other.below]) - count(below & ~sets[other.reach]))
         pairs = 2.0 * one.below.sum() * 2.0 * other.below.sum()
         coefficients.append(float(concordant / np.sqrt(pairs)) if pairs else np.nan)
     return np.array(coefficients)

@@ -109,8 +109,7 @@ def is_sorted(table: ScoreTable, column: int) -> bool:
 
 def is_rate(table: ScoreTable, column: int) -> bool:
     """True of a metric of zeros and ones with more than one episode an agent."""
-    values = table.values[..., column][table.driven]
-    return bool(table.counts.max() > 1 and np.isin(values, (0.0, 1.0)).all())
+    return bool(table.counts.max() > 1 and np.isin(table.values[..., column][table.driven], (0.0, 1.0)).all())
 
 
 def rate_intervals(rates: Floats, counts: Floats) -> list[Ends]:

@@ -71,14 +71,13 @@ def plan(decision: Decision, *, bound: float | None, made: Floats, scale: float)
     worth = worth if (worth > 0.0).all() else made
     regret = draws.max(axis=1) - draws[:, draws.mean(axis=0).argmax()]
     now = float(np.quantile(regret, CONFIDENCE))
-    agents = list(decision.expected_regret)
     if now <= bound:
         return Plan({}, bound, now)
     more = _more(draws, worth, bound)
     # A rollout that comes with its pair in the proxy counts as much as those that were made.
     real = np.ceil(more * made / worth).astype(int)
     without = int(np.ceil(more + worth - made).clip(0).sum()) if (worth > made + 0.5).any() else None
-    chosen = {agent: int(n) for agent, n in zip(agents, real, strict=True) if n > 0}
+    chosen = {agent: int(n) for agent, n in zip(decision.expected_regret, real, strict=True) if n > 0}
     alike = f"beyond {MOST_ROLLOUTS} rollouts of an agent: agents are too much alike"
     reason = alike if more.max() >= MOST_ROLLOUTS else ""
     return Plan(chosen, bound, now, without, reason)
@@ -88,8 +87,7 @@ def _more(draws: Floats, worth: Floats, bound: float) -> Floats:
     """More rollouts of each agent, shape (agents,)."""
     means, spread = draws.mean(axis=0), draws.std(axis=0) * np.sqrt(worth)
     best = int(means.argmax())
-    gap = np.maximum(means[best] - means, bound)
-    share = spread**2 / gap**2
+    share = spread**2 / np.maximum(means[best] - means, bound) ** 2
     others = np.arange(len(means)) != best
     share[best] = spread[best] * np.sqrt((share[others] ** 2 / np.maximum(spread[others], 1e-12) ** 2).sum())
     share /= share.max()
@@ -199,6 +197,5 @@ def expected_rounds(rates: Floats, foretold: Floats | None, rng: np.random.Gener
     foretold = None if foretold is None else foretold[rivals]
     outcomes = (rng.random((PATHS, len(rivals), MOST_ROUNDS)) < rates[rivals][:, None]).astype(np.float64)
     least = wealth_of(outcomes, foretold)[:, :, 0].min(axis=-1) >= (len(rates) - 1) / LEVEL
-    first = np.where(least.any(axis=1), least.argmax(axis=1) + 1, MOST_ROUNDS + 1)
-    middle = int(np.median(first))
+    middle = int(np.median(np.where(least.any(axis=1), least.argmax(axis=1) + 1, MOST_ROUNDS + 1)))
     return middle if middle <= MOST_ROUNDS else None

@@ -188,8 +188,7 @@ def examine_policy(classroom: Classroom, episodes: Sequence[Episode], policy: Po
     Raises:
         EpisodeError: If the domain or the policy fails, or a score is missing or no finite number.
     """
-    together = getattr(classroom, "examine_together", None)
-    if together is None:
+    if (together := getattr(classroom, "examine_together", None)) is None:
         scores = [classroom.examine(episode, policy) for episode in episodes]
     else:
         scores = list(together(episodes, policy))

@@ -146,8 +146,7 @@ def teaching_value(needs: SampleNeeds, proxy: str) -> TeachingValue:
 def samples_needed(needs: SampleNeeds, name: str) -> LearningEstimate:
     """The target samples that a learner needs, with its 95 % interval; None beyond the largest count."""
     needed = needs.needed[name]
-    least = np.minimum(needed, needs.last)
-    return _ends(least=least, middle=needed, most=needed)
+    return _ends(least=np.minimum(needed, needs.last), middle=needed, most=needed)
 
 
 def more_needed(needs: SampleNeeds, *, more: str, less: str) -> LearningEstimate:

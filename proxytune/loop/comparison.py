@@ -221,7 +221,6 @@ def prpv_figure(rows: Sequence[Compared]) -> Figure:
         axes.set_ylim(bottom=0.0)
         axes.set_title("held-out agents" if row.key == "held_out" else "tuned agents", fontsize=8)
     panels[0].set_ylabel("PRPV (lower is better)", fontsize=8)
-    floor = rows[0].before.floor_ends
-    if floor:
+    if floor := rows[0].before.floor_ends:
         panels[0].annotate("noise floor", (-0.55, floor[1]), fontsize=7, color="0.3", va="bottom")
     return figure

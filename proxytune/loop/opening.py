@@ -51,8 +51,7 @@ def held_out_of(settings: study.StudySettings, family: DomainFamily, *, driven: 
     if named and len(named) < FEWEST:
         raise settings.error(KEY, f"names {len(named)} of at least {FEWEST} agents; add some, or take the key out")
     if driven:  # A family that names its agents otherwise is asked without its guard.
-        lane_following = isinstance(study.bare_family(settings, settings.proxy), LaneFollowing)
-        scored = tuple(AGENTS) if lane_following else ()
+        scored = tuple(AGENTS) if isinstance(study.bare_family(settings, settings.proxy), LaneFollowing) else ()
     found = named or tuple(name for name in scored if name not in used and _is_known(family, name))
     return found if len(found) >= FEWEST else ()
 

@@ -155,8 +155,7 @@ def check_proxies(settings: study.StudySettings, setup: TeachingSetup) -> None:
 def classroom(settings: study.StudySettings, model: Path | None, lessons: str) -> Classroom:
     """The domain family that a study names, with a model: one that can teach, for lessons as their key has them."""
     family = study.load_family(settings, model)
-    lacks = [member for member in ("best_score", "demonstrate", "examine") if not hasattr(family, member)]
-    if lacks:
+    if lacks := [member for member in ("best_score", "demonstrate", "examine") if not hasattr(family, member)]:
         raise settings.error("family", f"{settings.family} cannot teach: it lacks {', '.join(lacks)}")
     if getattr(teaching_settings(settings), lessons) == learning.LEARNER and not hasattr(family, "guide"):
         problem = f"{settings.family} cannot teach a learner that drives: it lacks guide"
@@ -195,8 +194,7 @@ def teach_families(
         LearnerError: If none can teach.
         RunError: If a domain, the learner or the machine fails; all that was finished is kept.
     """
-    rooms = classrooms(settings)
-    if not rooms:
+    if not (rooms := classrooms(settings)):
         return {}
     setup = load_setup(settings)
     with watching(count_examinations(setup.settings, 1)) as watcher:
@@ -214,8 +212,7 @@ def teach_families(
         raise next(iter(failed.values()))
     needs = needs_of(setup, learning.curves_of(setup.settings.target_samples, scores))
     lessons = {name: _lesson(needs, name, thetas[name]) for name in rooms if name not in failed}
-    best = study.best_teaching_family(lessons)
-    if best is not None:
+    if (best := study.best_teaching_family(lessons)) is not None:
         lessons = {
             name: lesson if name == best else replace(lesson, more=learning.more_needed(needs, more=name, less=best))
             for name, lesson in lessons.items()

@@ -289,8 +289,7 @@ class TeachingSetup:
         return cast(OnPolicyClassroom, Supervised(family, domain, self.timeout_s))
 
     def _examine(self, point: CurvePoint) -> learning.Arrays:
-        weights = self._stage(point).weights(point.count)
-        if weights is None:
+        if (weights := self._stage(point).weights(point.count)) is None:
             return {"scores": np.full(self.starts, np.nan)}
         seeds = [exam_seed(self.seed, start) for start in range(self.starts)]
         episodes = [make_episode({}, agent=PUPIL, start=start, seed=seed) for start, seed in enumerate(seeds)]

@@ -214,8 +214,7 @@ class PlvSearch:
         named = finalists(self.setup, settings, self.space, tried.trials(), by_prpv)
         confirmed, unable = teach_finalists(settings, self.setup, named, self.watcher)
         trials, ended = tuple(tried.tried()), tried.ended()
-        without, when = needs.curves[learning.NONE], needs.when
-        return PlvStudy(settings, self.space, without, when, trials, ended, confirmed, unable)
+        return PlvStudy(settings, self.space, needs.curves[learning.NONE], needs.when, trials, ended, confirmed, unable)
 
     def facts(self) -> dict[str, Any]:
         """All that a trial depends on; if it changes, trials lose their meaning."""
@@ -290,8 +289,7 @@ class ProxyTrials:
 
 def _record(trial: PlvTrial, seconds: float) -> TrialRecord:
     """A trial as the store keeps it; where the learner did not converge it has failed, which is as bad as the worst."""
-    plv = trial.worth.plv.value
-    if plv is None:
+    if (plv := trial.worth.plv.value) is None:
         failure = f"the learner does not converge within {trial.curve.counts[-1]} target samples"
         return TrialRecord(trial.number, trial.theta, "failed", failure=failure, seconds=seconds)
     measures = {OBJECTIVE: plv, "needed": trial.worth.needed.value, "zero_shot": trial.zero_shot.value}

@@ -33,8 +33,7 @@ SAME_CODE = {
 @functools.lru_cache
 def code_meaning(family: str) -> str:
     """A digest of what the code of a family's rooms means, comments and docstrings left out."""
-    modules = (path for room in ROOMS[family] for path in (PACKAGE / room).rglob("*.py"))
-    return meaning_of(modules, PACKAGE)
+    return meaning_of((path for room in ROOMS[family] for path in (PACKAGE / room).rglob("*.py")), PACKAGE)
 
 
 def code_name(family: str) -> str:

@@ -142,8 +142,7 @@ def tune(
         code = (meaning_of_code(one) for one in (simulator, *(agents or {}).values()))
         identity = digest(*code, names, sorted((domain or {}).items()))
         units = {one.name: "" for one in settings.metrics}
-        family = GivenFamily(simulate, own, units, names, settings.starts, identity)
-        study = open_settings(settings, family)
+        study = open_settings(settings, GivenFamily(simulate, own, units, names, settings.starts, identity))
         return run_quietly(study, progress, _known(study, known))
 
 

@@ -28,8 +28,7 @@ class Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """Complain in two lines, usage and problem, and end with 2."""
-        choice = re.fullmatch(r"(.*)invalid choice: '(.*)' \(choose from (.*)\)", message)
-        if choice:
+        if choice := re.fullmatch(r"(.*)invalid choice: '(.*)' \(choose from (.*)\)", message):
             where, word, listed = choice.groups()
             known = [one.strip(" '") for one in listed.split(",")]
             message = f"{where}unknown '{word}'; {nearest(word, known)}"
@@ -70,8 +69,7 @@ def parser(words: Sequence[str] | None = None, prog: str = "") -> argparse.Argum
 def parse(words: Sequence[str]) -> argparse.Namespace:
     """The command that words ask for, with its options; words that are none of these end the program with 2."""
     arguments, unknown = parser(words).parse_known_args(words, argparse.Namespace(words=words))
-    option = next((word.partition("=")[0] for word in unknown if word.startswith("--")), "")
-    if option:
+    if option := next((word.partition("=")[0] for word in unknown if word.startswith("--")), ""):
         known = re.findall(r"--[a-z][\w-]*", arguments.parser.format_help())
         arguments.parser.error(f"unknown option '{option}'; {nearest(option, set(known))}")
     if unknown:

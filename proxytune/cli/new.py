@@ -33,8 +33,7 @@ def run(arguments: argparse.Namespace) -> Answer:
         raise RunError(f"{folder}: cannot be written ({problem.strerror}); choose another place") from None
     files = [str(folder / name) for name in skeleton.files]
     document = {"kind": arguments.kind, "files": files, "notes": list(skeleton.notes), "next": list(skeleton.next)}
-    lines = [*files, *skeleton.notes, "next:", *map(pasteable, skeleton.next)]
-    return Answer(document, Text("\n".join(lines)))
+    return Answer(document, Text("\n".join([*files, *skeleton.notes, "next:", *map(pasteable, skeleton.next)])))
 
 
 def pasteable(command: str) -> str:

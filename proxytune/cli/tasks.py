@@ -62,16 +62,14 @@ def fleet(arguments: argparse.Namespace) -> Answer:
 def measure(arguments: argparse.Namespace) -> Answer:
     """`measure`: score a study's agents from every start in the domain of a model file, and write the table."""
     check_place(arguments.output, inputs=(arguments.model, arguments.path, arguments.path / FILE_NAME))
-    options = {"repeats": arguments.repeats, "seed": arguments.seed}
-    found = api.measure(arguments.path, arguments.model, progress=True, **options)
+    found = api.measure(arguments.path, arguments.model, repeats=arguments.repeats, seed=arguments.seed, progress=True)
     found.write(arguments.output)
     document = {"scores": str(arguments.output), **found.document()}
     lines = [*(f"beware: {line}" for line in found.cautions), f"seed {found.seed}", str(arguments.output)]
     means = zip(found.scores.agents, found.scores.means, strict=True)
     rows = tuple((str(agent), *(f"{value:.3f}" for value in own)) for agent, own in means)
     heads = report.columns_of(("agent",), [report.plain(name) for name in found.scores.metrics])
-    table = report.Table("", heads, rows)
-    return Answer(document, Group(report.table_text(table), Text("\n".join(lines))))
+    return Answer(document, Group(report.table_text(report.Table("", heads, rows)), Text("\n".join(lines))))
 
 
 def record(arguments: argparse.Namespace) -> Answer:

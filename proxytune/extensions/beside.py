@@ -176,8 +176,7 @@ class _Loader(Loader):
         return self._loader.create_module(spec)
 
     def exec_module(self, module: ModuleType) -> None:
-        own = functools.partial(_import, self._home)
-        vars(module)["__builtins__"] = {**vars(builtins), "__import__": own}
+        vars(module)["__builtins__"] = {**vars(builtins), "__import__": functools.partial(_import, self._home)}
         if isinstance(self._loader, SourceFileLoader):
             path = self._loader.path
             # Bytecode kept beside a file may be that of what it was: Python compares whole seconds and sizes

@@ -326,8 +326,7 @@ class Cluster:
         """What becomes of a piece that a worker has not ended, if it still is one."""
         worker, one = self._workers.get(key), held[key]
         if worker is None or one.future.client is not self._client:
-            died = worker is None and not one.left_behind and pieces.has_died(one.number)
-            return LOST if died else _AGAIN
+            return LOST if worker is None and not one.left_behind and pieces.has_died(one.number) else _AGAIN
         if one.left_behind:
             return _UNDER_WAY
         if timeout_s is not None and self._clock.seconds() - one.since > timeout_s + START_S:

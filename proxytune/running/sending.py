@@ -136,6 +136,5 @@ def made_by() -> Mapping[str, str]:
 
 def check_code(theirs: Mapping[str, str]) -> None:
     """Refuse to work for a process of which the results may differ."""
-    changes = version_changes(theirs, made_by())
-    if changes:
+    if changes := version_changes(theirs, made_by()):
         raise OtherCodeError(f"the worker on {node()} has {', '.join(changes)}; install the same there as here")

@@ -325,8 +325,7 @@ class IsolatedWorker:
 
 def _exit_told(told: str) -> str:
     """How a process ended, from what loky tells: "The exit codes of the workers are {SIGSEGV(-11)}"."""
-    found = re.search(r"\{(\w+)\((-?\d+)\)", told)
-    if not found:
+    if not (found := re.search(r"\{(\w+)\((-?\d+)\)", told)):
         return "for an unknown reason"
     name, number = found.groups()
     return f"exit status {number}" if name == "EXIT" else name
@@ -379,8 +378,7 @@ def limited(what: str, timeout_s: float | None) -> Iterator[None]:
     Outside a traced task there is no limit, nor in a cluster's worker, which is not ours to end: that does its pieces
     in a thread of their own.
     """
-    trace = _trace.get()
-    if trace is not None:
+    if (trace := _trace.get()) is not None:
         with suppress(OSError):
             trace.path.write_text(what, encoding="utf-8")
     ours = threading.current_thread() is threading.main_thread()

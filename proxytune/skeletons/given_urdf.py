@@ -103,8 +103,7 @@ def _figures(body: driving.Body, radius: float) -> dict[str, float]:
 
 def _origin(body: driving.Body, radius: float) -> NDArray[np.float64]:
     """The middle of the axle, on the floor, in the root link's frame (3,) [m]."""
-    origin: NDArray[np.float64] = (body.left.centre + body.right.centre) / 2.0 - (0.0, 0.0, radius)
-    return origin
+    return np.asarray((body.left.centre + body.right.centre) / 2.0 - (0.0, 0.0, radius))
 
 
 def _conform(root: ET.Element, body: driving.Body, radius: float) -> Iterator[str]:
@@ -164,8 +163,7 @@ def _move(root: ET.Element, shift: NDArray[np.float64]) -> None:
     link = next(one for one in root.findall("link") if one.get("name") not in children)
     parts = [part for kind in ("inertial", "visual", "collision") for part in link.findall(kind)]
     for element in (*parts, *(one for one in root.findall("joint") if end_of(one, "parent") == link.get("name"))):
-        origin = element.find("origin")
-        if origin is None:
+        if (origin := element.find("origin")) is None:
             origin = ET.SubElement(element, "origin")
         before = np.array([float(value) for value in origin.get("xyz", "0 0 0").split()])
         origin.set("xyz", _text(before - shift))

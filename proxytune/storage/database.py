@@ -257,8 +257,7 @@ def _check(connection: sqlite3.Connection, path: Path, writable: bool) -> int:
 def _refuse_programs(connection: sqlite3.Connection, path: Path) -> None:
     """Refuse what runs by itself: proxytune makes tables alone."""
     query = "SELECT type, name FROM sqlite_master WHERE type IN ('trigger', 'view') OR sql LIKE 'CREATE VIRTUAL%'"
-    found = connection.execute(query).fetchone()
-    if found:
+    if found := connection.execute(query).fetchone():
         what, name = found
         has = f"has a {what if what != 'table' else 'virtual table'} {name!r:.60}, which no proxytune made"
         raise StoreError(f"{path}: {has}; take its data only from who made it, or move it away")

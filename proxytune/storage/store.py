@@ -262,8 +262,7 @@ class Store:
 
     def _instance(self, connection: sqlite3.Connection, identity: str, theta: str) -> int:
         query = "SELECT id FROM instances WHERE identity = ? AND theta = ?"
-        known = connection.execute(query, (identity, theta)).fetchone()
-        if known is None:
+        if (known := connection.execute(query, (identity, theta)).fetchone()) is None:
             known = (_next(connection, "id", "instances"),)
             database.write_row(connection, "instances", {"id": known[0], "identity": identity, "theta": theta})
         return int(known[0])

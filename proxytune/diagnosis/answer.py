@@ -145,7 +145,7 @@ class Rules:
     """A group of learnt curves is added if it takes away this share of the held-out squared error, and its logarithm
     falls by so many standard errors: of thirty groups of no use one is, every other time."""
 
-    rare_group_share: float = 0.25
+    rare_group_share: float = 0.1
     """Where nothing is learnt so, a group is added too that takes away this share: what acts in few drives is not sure
     in most of them."""
 

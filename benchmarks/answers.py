@@ -128,7 +128,9 @@ def ratio(one: Floats, other: Floats, axis: int = -1) -> Floats:
 
 
 def between(statistic: Callable[..., Any], *values: Floats) -> str:
-    """A statistic of truths, paired if of several, with its 95 % interval."""
+    """A statistic of truths, paired if of several, with its 95 % interval; one truth has none."""
+    if len(values[0]) < 2:
+        return f"{statistic(*values):.3g}"
     found = bootstrap(values, statistic, paired=True, n_resamples=4000, method="percentile", rng=0)
     low, high = found.confidence_interval
     return f"{statistic(*values):.3g} ({low:.2g} to {high:.2g})"

@@ -70,9 +70,11 @@ class ScoreReport(report.Shown, usefulness.Assessment):
 
     Attributes:
         names: What the proxy and the target are called.
+        left_out: The agents that `common` left out, in a line for each side.
     """
 
     names: tuple[str, str] = ("proxy", "target")
+    left_out: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         return f"ScoreReport: {self.sentence}"
@@ -189,7 +191,7 @@ def score(  # type: ignore[misc]  # the options above are those below
         seed: Seed of resamples, permutations and draws.
         resamples: How many resamples and permutations to draw.
         columns: What columns are called in the tables, as in {"agent": "policy"}.
-        common: Leave out agents that one side has alone, instead of refusing them.
+        common: Leave out agents that one side has alone, instead of refusing them; `.left_out` says which.
         unpaired: Treat episodes with equal labels as unrelated.
         decide_on: The metric to choose an agent by, or "mean".
         rollouts: Rollouts behind each mean of the target, where it has means alone.
@@ -217,8 +219,7 @@ def score(  # type: ignore[misc]  # the options above are those below
     given: Mapping[str, Any] = several or {names[0]: both if proxy is None else proxy}
     sides = {name: _table(one, "proxy", wanted, columns) for name, one in given.items()}
     sides["target"] = _table(target if both is None else both, "target", wanted, columns)
-    if common:
-        sides = dict(zip(sides, usefulness.in_common(sides)[0].values(), strict=True))
+    sides, left_out = usefulness.in_common(sides) if common else (sides, ())
     if unpaired:
         sides = {side: table.unpaired() for side, table in sides.items()}
     asked = usefulness.Asked(decide_on, rollouts, regret)
@@ -229,7 +230,7 @@ def score(  # type: ignore[misc]  # the options above are those below
     reports = {}
     for name, one in found.items():
         own = {each.name: getattr(one, each.name) for each in fields(usefulness.Assessment)}
-        reports[name] = ScoreReport(**own, names=(name, names[1]))
+        reports[name] = ScoreReport(**own, names=(name, names[1]), left_out=left_out)
     return reports[names[0]] if selection is None else Ranking(reports, selection)
 
 

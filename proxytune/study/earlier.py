@@ -168,6 +168,8 @@ def read_source(settings: StudySettings, name: str, key: str = FULL) -> Source:
     path = shipped("studies") / name if not exists(path) and exists(shipped("studies") / name) else path
     if not exists(path):
         raise _refused(settings, key, path, "no such study or table of trials; check the path")
+    if path.is_dir() and not any((path / part).exists() for part in ("study.toml", DATABASE, BANK_FILE)):
+        raise _refused(settings, key, path, "is a folder without study.toml; name a study or a table of trials")
     for home, learns in _chain(path):
         if home.resolve() == settings.folder.resolve():
             told = "learns from this study in turn" if learns else "is this very study"

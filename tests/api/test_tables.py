@@ -95,6 +95,8 @@ def test_one_metric_may_be_text_and_agents_the_index(tmp_path):
     indexed = proxy.set_index(["agent", "episode"])
     assert documented(score(proxy=indexed, target=target.set_index("agent"), metrics=METRICS)) == plain
     assert list(indexed.index.names) == ["agent", "episode"], "the user's table stays as it is"
+    (left_out,) = score(proxy=proxy, target=table(2, "ABCDEF"), metrics=METRICS, common=True).left_out
+    assert left_out.endswith("F of target")
 
 
 def test_a_table_that_was_read_before_may_be_either_side(by_command):

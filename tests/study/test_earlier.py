@@ -180,6 +180,7 @@ BAD = {
         "no table of trials",
     ),
     "not run": ({}, lambda bank: [(bank / name).unlink() for name in ("study.db", BANK_FILE)], "run it first"),
+    "an empty folder": ({}, lambda bank: [one.unlink() for one in bank.iterdir()], "is a folder without study.toml"),
     "not there": ({}, lambda bank: shutil.rmtree(bank), "no such study or table of trials"),
 }
 

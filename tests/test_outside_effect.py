@@ -153,8 +153,7 @@ def test_the_effect_of_a_parameter_is_told_from_its_name_which_several_add_to_th
 def test_two_folders_have_effects_of_one_name_each_its_own_after_the_shipped_ones_of_its_stage(folder, tmp_path):
     made = effects_from({NAME: 0.3, "turn_slip": 0.01, "trim": 0.1}, ROBOT.figures, Catalogue(folder))
     assert [effect.name for effect in made] == ["trim", "turn_slip", "weak_reverse"]
-    told = complaint_of(effects_from, {NAME: 1.0}, ROBOT.figures, Catalogue(folder))
-    assert "must be between 0 and 0.9" in told
+    assert "must be between 0 and 0.9" in complaint_of(effects_from, {NAME: 1.0}, ROBOT.figures, Catalogue(folder))
     other = tmp_path / "other"
     other.mkdir()
     (other / "weak_reverse.py").write_text(WEAK_REVERSE.replace("high=0.9", "high=0.85"), encoding="utf-8")

@@ -98,8 +98,7 @@ TRAPS = {
 
 @pytest.mark.parametrize(("text", "says"), TRAPS.values(), ids=TRAPS)
 def test_a_trap_in_toml_is_one_line_at_once(write_file, text, says):
-    path = write_file(text, "study.toml")
-    assert says in complaint_of(read_settings, path)
+    assert says in complaint_of(read_settings, write_file(text, "study.toml"))
 
 
 LONG = {"long": f"{'a' * 300}.csv", "far": "a/" * 4000}

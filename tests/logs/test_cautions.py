@@ -97,8 +97,7 @@ def test_what_a_diagnosis_is_for_draws_no_caution(case):
 def test_thin_wheels_are_told_and_nothing_without_poses_or_figures():
     (line,) = figure_cautions({"wheel_radius": 3e-5, "full_speed": 0.6}, "robot mine")
     assert line.startswith("robot mine: its wheel_radius is 3e-05 m, and robots have 0.002 to 1.5 m")
-    lost = changed(lambda episode: replace(episode, poses=np.full_like(episode.poses, np.nan)))
-    assert cautions(lost) == ()
+    assert cautions(changed(lambda episode: replace(episode, poses=np.full_like(episode.poses, np.nan)))) == ()
     assert log_cautions(commanded(0.5), {}) == ()
 
 

@@ -67,8 +67,7 @@ def test_a_single_repeat_in_slow_rows_the_last_pose_and_rounding_are_no_stand():
     assert rows_in(log(held(STRAIGHT[::2].repeat(2), 50, 10))) == [[*range(0, 51, 2)]]
     # Of a log whose poses are its own it is one: it may have stopped.
     assert rows_in(log(held(STRAIGHT, 50, 10))) == [[*range(51), 54, 58]]
-    rounded = np.round(1e-4 * np.random.default_rng(1).standard_normal(ROWS).cumsum(), 4).repeat(6)
-    (found,) = rows_in(log(rounded))
+    (found,) = rows_in(log(np.round(1e-4 * np.random.default_rng(1).standard_normal(ROWS).cumsum(), 4).repeat(6)))
     assert np.diff(found).max() <= 4
 
 

@@ -108,7 +108,7 @@ def test_windows_whose_poses_have_times_of_their_own_are_joined(tmp_path):
 def test_a_diagnosis_is_of_the_drives_that_windows_make(monkeypatch):
     seen = []
 
-    def stop(log, robot, like):
+    def stop(log, robot, like, model):
         seen.append(log)
         raise LogError("seen enough")
 

@@ -114,8 +114,7 @@ def test_points_names_and_bars_of_a_scatter_are_those_of_the_scores(assessment):
 def test_no_two_names_overlap_and_none_is_cut_at_85_millimetres(agents):
     values = np.round(np.random.default_rng(1).normal(size=(agents, 3, 2)), 1)
     values[: agents // 2] = 1.0
-    names = tuple(f"policy_number_{i}" for i in range(agents))
-    both = ScoreTable(names, ("0", "1", "2"), ("distance", "time"), values)
+    both = ScoreTable(tuple(f"policy_number_{i}" for i in range(agents)), ("0", "1", "2"), ("distance", "time"), values)
     figure = scatter_figure(assess(proxy=both, target=both, metrics=BOTH, resamples=20))
     assert figure.get_figwidth() * 25.4 == pytest.approx(85.0)
     figure.draw_without_rendering()

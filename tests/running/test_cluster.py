@@ -89,8 +89,7 @@ def test_a_worker_that_does_not_start_again_holds_up_no_command_that_ends():
 def test_where_nothing_answers_the_user_is_told_in_one_line(make_study, capsys, monkeypatch):
     monkeypatch.setattr("proxytune.running.cluster.CONNECT_S", 0.5)
     assert main(["study", str(make_study()), "--backend", "dask", "--address", "tcp://127.0.0.1:9"]) == 2
-    last = capsys.readouterr().err.strip().splitlines()[-1]
-    assert "--address tcp://127.0.0.1:9: no scheduler answers" in last
+    assert "--address tcp://127.0.0.1:9: no scheduler answers" in capsys.readouterr().err.strip().splitlines()[-1]
 
 
 @pytest.mark.parametrize("greeting", [b"", b"SSH-2.0-OpenSSH_9.2\r\n"])

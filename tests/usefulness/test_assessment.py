@@ -105,8 +105,7 @@ def test_the_target_s_own_repeats_are_taken_where_it_has_them():
     one = ordered(4, agents=8)
     values = np.concatenate([one.values, again(one).values], axis=1)
     labels = tuple(f"{episode}/{repeat}" for repeat in range(2) for episode in one.episodes)
-    target = ScoreTable(one.agents, labels, one.metrics, values)
-    found = assess(proxy=again(one, seed=5), target=target, metrics=CLEAR)
+    found = assess(proxy=again(one, seed=5), target=ScoreTable(one.agents, labels, one.metrics, values), metrics=CLEAR)
     assert found.noise_floor.kind == "same starts"
     assert found.at_noise_floor is True
     assert found.inputs.paired

@@ -165,8 +165,7 @@ def test_a_winner_is_shown_before_the_end_and_sooner_with_a_proxy():
     assert looked_at(target, target).winner is None
     found = looked_at(rolled([0.7, 0.5, 0.3], 20), rolled([0.7, 0.5, 0.3], 500, seed=9))
     assert found.expected_rounds["with proxy"] <= found.expected_rounds["without proxy"]
-    wild = table_of([[1.5, 1.5], [0.5, 0.5]], metrics=("success",))
-    both = looked_at(rolled([0.8, 0.4], 60), wild).expected_rounds
+    both = looked_at(rolled([0.8, 0.4], 60), table_of([[1.5, 1.5], [0.5, 0.5]], metrics=("success",))).expected_rounds
     assert both["with proxy"] == pytest.approx(both["without proxy"], rel=0.4)
 
 

@@ -65,8 +65,7 @@ def test_halves_are_disjoint_for_agents_alike_and_without_a_second_episode_there
     assert (result.value, result.kind) == (None, "none")
     assert "each agent has one episode on the target" in result.reason
     (one, two), _ = planted(5)
-    other = table_of(two, "abcdef")
-    assert "both times" in floor_of_repeats(domain=table_of(one), again=other, metrics=FIRST).reason
+    assert "both times" in floor_of_repeats(domain=table_of(one), again=table_of(two, "abcdef"), metrics=FIRST).reason
 
 
 @given(seed=st.integers(0, 10_000), starts=st.integers(2, 5), repeats=st.integers(2, 5))

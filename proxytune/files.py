@@ -149,7 +149,11 @@ def write_whole(
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with draft_of(path) as draft:
-            draft.write_text(write, encoding="utf-8", newline="\n") if isinstance(write, str) else write(draft)
+            if isinstance(write, str):
+                # A path in it may have bytes that are no UTF-8.
+                draft.write_text(write, "utf-8", "backslashreplace", "\n")
+            else:
+                write(draft)
     except OSError as problem:
         raise kind(f"{path}: {what}cannot be written ({problem.strerror}); fix that and run again") from None
 

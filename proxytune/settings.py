@@ -225,7 +225,7 @@ def read_settings(path: Path) -> Section:
         SettingsError: If the file is missing, unreadable or not TOML.
     """
     try:
-        text = read_text(path, usual_mb=SETTINGS_MB)
+        text = read_text(path, "utf-8-sig", usual_mb=SETTINGS_MB)
         for number, line in enumerate(text.splitlines(), start=1):
             if line.count(".") > MOST_DOTS and max(part.count(".") for part in re.split("[,=]", line)) > MOST_DOTS:
                 raise ValueError(f"a key of more than {MOST_DOTS} parts (at line {number})")

@@ -14,7 +14,7 @@ import pytest
 from one_line import complaint_of
 
 from proxytune.errors import InputError, SettingsError
-from proxytune.files import check_place, draft_of, draft_path, folder_draft_of, shipped, temporary_folder
+from proxytune.files import check_place, draft_of, draft_path, folder_draft_of, shipped, temporary_folder, write_whole
 
 
 def test_the_draft_takes_the_files_name_once_it_is_written(tmp_path, write_file):
@@ -39,6 +39,11 @@ def test_a_place_is_free_where_a_file_or_folder_may_come_to_be(tmp_path):
     for name in ("old.csv", "same.csv"):
         with pytest.raises(InputError, match=f"{name}: is read by this command, and would be lost; give another name"):
             check_place(tmp_path / name, inputs=("gone.csv", tmp_path / "old.csv"))
+
+
+def test_a_text_with_bytes_that_are_no_utf_8_is_written_with_these_spelt_out(tmp_path):
+    write_whole(tmp_path / "page.html", "caf\udcff é")
+    assert (tmp_path / "page.html").read_text("utf-8") == "caf\\udcff é"
 
 
 def test_a_pipe_is_not_replaced_and_a_link_in_the_drafts_place_not_followed(tmp_path):

@@ -44,6 +44,8 @@ def test_a_mistake_names_file_key_and_remedy(tmp_path, call, says):
 
 
 def test_good_values_are_taken_as_they_are(tmp_path):
+    (tmp_path / "marked.toml").write_bytes(b"\xef\xbb\xbfn = 3\r\n")
+    assert read_settings(tmp_path / "marked.toml").whole("n") == 3
     s = section(tmp_path, n=3, x=0.5, t="a", ts=["a", "b"], b=[1, 2.5], deep={"k": 1})
     assert (s.number("n"), s.whole("n"), s.number("x"), s.text("t"), s.texts("ts")) == (3.0, 3, 0.5, "a", ("a", "b"))
     assert s.bounds("b") == (1.0, 2.5)

@@ -235,7 +235,9 @@ def score(  # type: ignore[misc]  # the options above are those below
 
 
 def _metrics(metrics: str | Metric | Sequence[str | Metric] | None, header: Sequence[str]) -> list[Metric]:
-    given = [metrics] if isinstance(metrics, str | Metric) else list(metrics or ())
+    given = [metrics] if isinstance(metrics, str | Metric) else [] if metrics is None else metrics
+    if not isinstance(given, Sequence) or not all(isinstance(one, str | Metric) for one in given):
+        raise InputError(f"metrics: must be texts as 'success:max' or of Metric, got {metrics!r}")
     if not given:
         given = [f"{name}:max" for name in both_metrics(header) if "success" in name]
     compared = [

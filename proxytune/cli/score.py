@@ -107,12 +107,13 @@ def _sides_given(arguments: argparse.Namespace) -> None:
 
 def run(arguments: argparse.Namespace) -> Answer:
     """Score one proxy, or rank several."""
+    _sides_given(arguments)
     if arguments.table:
         report.check_table_file("--table", arguments.table)
-        check_place(arguments.table)
+        given = (*arguments.proxy, *arguments.target)
+        check_place(arguments.table, inputs=[split_source(source)[0] for source in given])
     if arguments.output:
         check_place(arguments.output, folder=True)
-    _sides_given(arguments)
     arguments.metric = _metrics_given(arguments)
     metrics = [scores.Metric.parse(text) for text in arguments.metric]
     (target_name, target), proxies = read_sides(arguments, [metric.name for metric in metrics])

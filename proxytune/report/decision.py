@@ -83,7 +83,7 @@ def decision_table(assessment: Assessment, target: str) -> Table:
         rows.append((
             agent,
             "–" if mean is None or ends is None else with_span(mean, *ends),
-            "–" if chance is None else f"{chance:.2g}",
+            "–" if chance is None else "> 0.99" if 0.995 <= chance < 1.0 else f"{chance:.2g}",
             with_span(short(decision.expected_regret[agent], 2), *(span or (None, None))),
             str(plan.rollouts.get(agent, "")),
         ))  # fmt: skip

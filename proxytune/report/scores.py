@@ -32,7 +32,9 @@ def score_sentence(assessments: Assessments, selection: Selection | None, *, tar
     best = selection.ranking[0][0]
     worse = [pair.worse for pair in selection.differences if pair.better == best and pair.beyond_noise]
     beyond = f"beyond noise better than {listed(worse)}" if worse else "not beyond noise better than any other"
-    return f"{best} ranks the agents most like {target}, {beyond}. {_say_prpv(assessments[best], best, target)}"
+    alike = [pair.worse for pair in selection.differences if pair.better == best and pair.value == 0.0]
+    ranks = f"{listed([best, *alike])} rank the agents alike," if alike else f"{best} ranks the agents"
+    return f"{ranks} most like {target}, {beyond}. {_say_prpv(assessments[best], best, target)}"
 
 
 def _say_prpv(assessment: Assessment, proxy: str, target: str) -> str:

@@ -55,7 +55,7 @@ def form_rows(path: Path, domain: str | None = None) -> tuple[list[str], list[Li
 
 def _json_rows(path: Path) -> list[dict[str, Any]]:
     try:
-        found = json.loads(read_text(path, "utf-8-sig"))
+        found = json.loads(read_text(path, "utf-8-sig"), object_pairs_hook=_each_once)
     except (OSError, UnicodeDecodeError, ValueError, RecursionError) as problem:
         raise ScoresError(f"{path}: is not readable as JSON ({str(problem)[:80]})") from None
     if isinstance(found, list) and found and all(isinstance(row, dict) for row in found):
@@ -70,6 +70,16 @@ def _json_rows(path: Path) -> list[dict[str, Any]]:
     if {"aggregated", "overall"} & set(found):
         raise ScoresError(f"{path}: has no 'per_episode' and no 'per_task'; its aggregates alone say nothing of noise")
     return _nested(path, found)
+
+
+def _each_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """An object of JSON; a name twice would drop a score."""
+    found = dict(pairs)
+    if len(found) < len(pairs):
+        raise ValueError(
+            f"'{next(name for name in found if sum(n == name for n, _ in pairs) > 1)}' twice in one object"
+        )
+    return found
 
 
 def _episode(path: Path, agent: str, row: object, place: int) -> dict[str, Any]:

@@ -66,6 +66,7 @@ class StudyResult:
     spared: tuple[int, float]  # what trials that were cut off did without: episodes, and about their seconds
     failures: tuple[str, ...]  # the first failed episodes, told in one line each
     cautions: tuple[str, ...]  # what the target's table does not allow, and what is probably not meant: a line each
+    rescored: bool = False  # whether other metrics judge it than the study searched by
 
     def __repr__(self) -> str:
         return f"StudyResult of '{self.study.settings.name}': {len(self.trials)} trials; {self.best!r}"
@@ -249,7 +250,7 @@ def rescored(run: StudyRun, metrics: Sequence[Metric]) -> StudyResult:
         rescored_pruned(other, trial) if trial.state == "cut" else record(trial.number, other.evaluation_of(trial))
         for trial in own
     ]
-    return replace(result_of(other, trials), stopped=stopped(run, own))
+    return replace(result_of(other, trials), stopped=stopped(run, own), rescored=True)
 
 
 def history_of(result: StudyResult) -> History:

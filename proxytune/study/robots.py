@@ -159,13 +159,16 @@ def _robots(run: StudyRun, targets: Sequence[Path]) -> Iterator[Robot]:
     # All tables are read before any is learnt from.
     measured = [_measured(run, path) for path in targets]
     first: Knowledge | None = None
+    seen: dict[bytes, str] = {}
     for name, path, (one, left_out) in zip(_names(targets), targets, measured, strict=True):
         goal = goal_of(one)
         if first is None or goal.outputs != first.goal.outputs:
             first = own = knowledge_of(one, one.finished_trials())
         else:
             own = first.of(goal)
-        yield Robot(name, path, own, tuple(filter(None, (*left_out, noise_of(one).caution))))
+        like = seen.setdefault(goal.values.tobytes(), name)
+        copied = "" if like == name else f"{path}: scores as {like} to the last digit; a copy is no other robot"
+        yield Robot(name, path, own, tuple(filter(None, (*left_out, noise_of(one).caution, copied))))
 
 
 def _measured(run: StudyRun, path: Path) -> tuple[StudyRun, tuple[str, ...]]:

@@ -23,8 +23,9 @@ from proxytune.storage import FAMILIES
 
 def metrics_of(read: Section) -> tuple[Metric, ...]:
     """The metrics that agents are compared by."""
+    texts = read.texts("metrics")
     try:
-        metrics = tuple(Metric.parse(text) for text in read.texts("metrics"))
+        metrics = tuple(map(Metric.parse, texts))
     except InputError as problem:
         raise read.error("metrics", str(problem)) from None
     names = [metric.name for metric in metrics]

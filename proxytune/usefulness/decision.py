@@ -148,6 +148,8 @@ def decide(inputs: Comparison, asked: Asked, saving: Saving | None = None, seed:
     if len(parts) == 1:
         parts = _parts_by_start(inputs, columns[0], float(signs[0]))
     rng = np.random.default_rng(seed)
+    if asked.rollouts is not None and inputs.target.counts.min() > 1:
+        raise InputError("rollouts: are stated for means alone, and the target has each rollout; leave that out")
     known = draw_means(inputs.target, columns, signs, asked.rollouts, saving, rng)
     each = None if known is None else known[0]
     if len(columns) == 1 and len(parts) > 1:

@@ -152,6 +152,8 @@ def test_what_a_robot_says_depends_on_no_other_and_names_alike_have_their_folder
         (tmp_path / name).mkdir()
         paths.append(shutil.copy(found.result.robots[int(name[-1])].path, tmp_path / name / "target.csv"))
     assert list(proxytune.fleet(bank, paths).document()["robots"]) == ["robot1/target", "robot2/target"]
+    copies = [paths[0], shutil.copy(paths[0], tmp_path / "copy.csv")]
+    assert "scores as target to the last digit" in str(proxytune.fleet(bank, copies).document()["cautions"])
 
 
 BAD = {

@@ -209,6 +209,8 @@ def test_a_target_as_people_keep_it_gives_the_figures_of_a_tidy_one_and_agents_o
     assert tidy.pop("target") == "real"
     assert found == tidy
     assert found["left_out"] == []
+    words = (*SIDES, *METRIC, "--table", "real.csv")
+    assert "real.csv: is read by this command, and would be lost" in complaint_of(run, *words)
     words = (*OWN, "--target", "people.csv", *COLUMNS, *METRIC)
     assert re.search(r"the proxy lacks scores of human, .* \(score --common\)", complaint_of(run, *words))
     assert document(*words, "--common")["left_out"] == ["left out, since not all sides have them: human of the target"]

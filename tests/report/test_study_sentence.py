@@ -28,7 +28,14 @@ def study(parameters=(TRIM, PITCH, BLUR), *, names=("trim", "delay"), family=DEF
     settings = {"budget": 24, "starts": 4, "confirm": 1, "learn_from": ()}
     known = {"fits": True, "p_value": 0.4, "information": (TOLD_BY_STARTS,), "share": 0.0016}
     facts = {"perfect": True, "inside": True, "floor": FLOOR, "excess": EXCESS, "stopped": "the budget is spent"}
-    facts |= {"prpv": PRPV, "nominal": None, "chance": CHANCE, "trials": range(24), "most_starts": 10}
+    facts |= {
+        "rescored": False,
+        "prpv": PRPV,
+        "nominal": None,
+        "chance": CHANCE,
+        "trials": range(24),
+        "most_starts": 10,
+    }
     for given in (settings, known, facts):
         given |= {key: changes.pop(key) for key in list(changes) if key in given}
     assert not changes
@@ -94,7 +101,7 @@ def test_a_score_above_the_floor_is_not_called_found_and_what_chance_explains_ha
     assert "found" not in text
     text = said(perfect=False, inside=False)
     assert text.startswith("θ narrowed down to 0.16 % of the box: ")
-    assert "at most 8 pairs worse, but other scores of the agents differ from the target's." in text
+    assert ": by PRPV alone it cannot be told from a perfect proxy; at most 8 pairs worse, but other scores of " in text
     assert "no difference" not in text
     assert text.endswith("Next: raise budget from 24 to 48, to get closer.")
     assert said(**BY_CHANCE) == (
@@ -148,6 +155,7 @@ def test_without_fresh_episodes_or_before_its_end_a_study_says_so_and_how_to_go_
     unconfirmed = said(**ABOVE, fresh=False, confirm=0)
     assert "is 16 in the search's own episodes, which may be partly luck." in unconfirmed
     assert unconfirmed.endswith("Next: set confirm = 1 and run the study again, to drive the best θ afresh.")
+    assert said(**ABOVE, fresh=False, rescored=True).endswith("to a new study, with learn_from = [this one].")
     assert "set confirm" not in said(**ABOVE, fresh=False)
     assert "perfect" not in unconfirmed
     text = said(**ABOVE, stopped="", trials=range(14))

@@ -104,6 +104,7 @@ def test_dictionaries_in_a_python_file_are_read_and_nothing_is_run(file, tmp_pat
         ("a.py", "X = {[1]: 2}", "has none that is written out"),
         ("a.json", "{", "not readable as JSON"),
         ("a.json", '{"pick": 3}', "holds no scores by agent"),
+        ("a.json", '{"pick": {"x": 0.5, "x": 0.7}}', "'x' twice in one object"),
         ("a.json", '{"aggregated": {}}', "aggregates alone"),
         ("a.json", '{"per_episode": [3]}', "per_episode, entry 0"),
         ("a.json", '{"per_task": [{"metrics": {"successes": 3}}]}', "lists of one length"),

@@ -270,6 +270,9 @@ def test_the_document_has_the_answer_and_every_candidate_and_the_row_of_the_sear
     assert "; expected, in " in fresh[3]
     assert searched[:2] == ("  in search", str(found.best.assessment.prpv.value))
     assert searched[3].startswith("4 lower by luck")
+    other = replace(found.study, settings=replace(found.study.settings, objective="ppv"))
+    (_, *_, luck) = usefulness_table(replace(found, study=other)).rows[1]
+    assert luck.startswith("wrongly ordered pairs, 0 to ")
     unlucky = replace(answer, scores=(int(answer.trial.prpv),))
     searched = usefulness_table(replace(found, confirmation=replace(found.confirmation, answer=unlucky))).rows[1]
     assert searched[3].startswith("no optimism")

@@ -162,6 +162,7 @@ BAD = {
     "agents as a text": ({"agents": '"agent0"'}, "agents: must be a list of texts"),
     "no metric": ({"metrics": "[]"}, "metrics: is empty"),
     "a metric without direction": ({"metrics": '["distance"]'}, "metrics: metric 'distance': write NAME:max"),
+    "the same metric": ({"metrics": '["distance:max", "distance:max"]'}, "study.toml: metrics: names something twice"),
     "a metric twice": ({"metrics": '["distance:max", "distance:min"]'}, "metrics: names a metric twice"),
     "an unknown rule": ({"on_failure": '"stopp"'}, "on_failure: unknown value 'stopp'; did you mean 'stop'?"),
     "unknown rule to stop": ({"stop": "{ wall_time = 5 }"}, "stop.wall_time: unknown key; did you mean 'wall_time_s'"),

@@ -64,6 +64,8 @@ def test_means_without_rollouts_give_the_observed_regret_also_where_less_is_bett
     assert found.observed.regret == found.expected_regret["a"] == 0.25
     assert "number of rollouts" in found.notes[0]
     assert decided(proxy, target, rollouts=100).probability_best > 0.99
+    with pytest.raises(InputError, match="has each rollout; leave that out"):
+        decided(*[rolled([0.8, 0.4], 60)] * 2, rollouts=3)
     proxy = means(["seconds"], a=(1.0,), b=(2.0,))
     found = decided(proxy, means(["seconds"], a=(5.0,), b=(4.0,)), [Metric("seconds", "min")])
     assert (found.winner, found.observed.proxy_winners, found.observed.regret) == ("b", ("a",), 1.0)

@@ -96,7 +96,7 @@ def _say_usefulness(result: StudyResult) -> str:
         return f"{score}, {floor}: better than chance, but {lower}.{before}"
     most = ceil(excess.high)
     worse = f"; at most {most} {'pair' if most == 1 else 'pairs'} worse" if most > 0 else ""
-    alike = f"it cannot be told from a perfect proxy{worse}"
+    alike = f"{'it' if result.perfect else 'by PRPV alone it'} cannot be told from a perfect proxy{worse}"
     other = "" if result.perfect else ", but other scores of the agents differ from the target's"
     return f"{score}, {floor}: {alike}{other}.{before}"
 
@@ -119,6 +119,8 @@ def say_next_step(result: StudyResult) -> str:
         return f"log drives of the target (a model's: `record`) and run `python -m proxytune diagnose LOG{declared}`"
     if result.judged.chance.explains:
         return f"{_more_trials(result)}, or add agents whose scores differ more"
+    if not _is_fresh(result) and result.rescored:
+        return "search by these metrics: give them to a new study, with learn_from = [this one]"
     if not _is_fresh(result):
         return f"{'' if settings.confirm else 'set confirm = 1 and '}run the study again, to drive the best θ afresh"
     if result.perfect:

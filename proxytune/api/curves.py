@@ -59,9 +59,9 @@ class SweepReport(report.Shown):
     def held(self) -> str:
         """Values at which the other parameters are held, in words."""
         if self.chosen == "best":
-            values = report.held_values(self.theta, whose="the study's best θ: ")
+            values = report.held_values(self.curves, whose="the study's best θ: ")
             return f"{values}; --at nominal holds the robot's own"
-        return "the others are nominal" if self.chosen == "nominal" else report.held_values(self.theta)
+        return "the others are nominal" if self.chosen == "nominal" else report.held_values(self.curves)
 
     def tables(self) -> dict[str, pd.DataFrame]:
         """For each parameter, one row per value: each measure."""

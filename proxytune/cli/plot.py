@@ -40,7 +40,7 @@ def run(arguments: argparse.Namespace) -> Answer:
     latest, command = list({report.curve_name(curve): curve for curve in curves}.values()), typed(arguments)
     pages = []
     for alike in report.held_alike(latest):
-        held = report.held_values(alike[0].base)
+        held = report.held_values(alike)
         pages.append(str(report.write_sweep_page(shown, alike, drawn, folder / "figures", held, command)))
     document: dict[str, Any] = {}
     if result:

@@ -250,9 +250,10 @@ def held_alike(curves: Sequence[SweepCurve]) -> list[list[SweepCurve]]:
     return [list(members) for _, members in groupby(sorted(curves, key=base), key=base)]
 
 
-def held_values(base: Theta, whose: str = "") -> str:
-    """Say what the others are held at, and whose values these are."""
-    values = ", ".join(f"{name}={value:g}" for name, value in sorted(base.items()))
+def held_values(curves: Sequence[SweepCurve], whose: str = "") -> str:
+    """Say what the others are held at, and whose values these are; of one curve its own value is none of these."""
+    own = curves[0].parameter if len(curves) == 1 else ""
+    values = ", ".join(f"{name}={value:g}" for name, value in sorted(curves[0].base.items()) if name != own)
     return f"the others are held at {whose}{values}" if values else "the others are nominal"
 
 

@@ -180,7 +180,11 @@ def read_source(settings: StudySettings, name: str, key: str = FULL) -> Source:
     if not table.exists():
         told = f"has neither {DATABASE} nor {BANK_FILE}; run it first: python -m proxytune study {path}"
         raise _refused(settings, key, path, told)
-    return _of_table(table)
+    try:
+        return _of_table(table)
+    except ValueError:
+        told = "is no table of trials as proxytune writes it; name a study, or restore a copy"
+        raise _refused(settings, key, path, told) from None
 
 
 def _chain(path: Path) -> Iterator[tuple[Path, bool]]:
@@ -231,8 +235,8 @@ def _of_table(path: Path) -> Source:
             raise ValueError
     except OSError as problem:
         raise StoreError(f"{path}: cannot be read ({problem.strerror}); check it") from None
-    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
-        raise StoreError(f"{path}: is no table of trials as proxytune writes it; restore a copy") from None
+    except (KeyError, TypeError, AttributeError, RecursionError) as problem:
+        raise ValueError from problem
     return Source(path, facts, trials, placement)
 
 

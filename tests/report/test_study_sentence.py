@@ -155,6 +155,7 @@ def test_without_fresh_episodes_or_before_its_end_a_study_says_so_and_how_to_go_
     unconfirmed = said(**ABOVE, fresh=False, confirm=0)
     assert "is 16 in the search's own episodes, which may be partly luck." in unconfirmed
     assert unconfirmed.endswith("Next: set confirm = 1 and run the study again, to drive the best θ afresh.")
+    assert "smaller tolerances" in said(**ABOVE, cautions=["distance:max:500%, leaves no two agents apart: all tie"])
     assert said(**ABOVE, fresh=False, rescored=True).endswith("to a new study, with learn_from = [this one].")
     assert "set confirm" not in said(**ABOVE, fresh=False)
     assert "perfect" not in unconfirmed

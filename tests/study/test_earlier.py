@@ -179,6 +179,11 @@ BAD = {
         ),
         "no table of trials",
     ),
+    "no table": (
+        {},
+        lambda bank: [(bank / "study.db").unlink(), (bank / BANK_FILE).write_text("a")],
+        "learn_from: .*table",
+    ),
     "not run": ({}, lambda bank: [(bank / name).unlink() for name in ("study.db", BANK_FILE)], "run it first"),
     "an empty folder": ({}, lambda bank: [one.unlink() for one in bank.iterdir()], "is a folder without study.toml"),
     "not there": ({}, lambda bank: shutil.rmtree(bank), "no such study or table of trials"),

@@ -28,14 +28,8 @@ def study(parameters=(TRIM, PITCH, BLUR), *, names=("trim", "delay"), family=DEF
     settings = {"budget": 24, "starts": 4, "confirm": 1, "learn_from": ()}
     known = {"fits": True, "p_value": 0.4, "information": (TOLD_BY_STARTS,), "share": 0.0016}
     facts = {"perfect": True, "inside": True, "floor": FLOOR, "excess": EXCESS, "stopped": "the budget is spent"}
-    facts |= {
-        "rescored": False,
-        "prpv": PRPV,
-        "nominal": None,
-        "chance": CHANCE,
-        "trials": range(24),
-        "most_starts": 10,
-    }
+    facts |= {"prpv": PRPV, "nominal": None, "chance": CHANCE, "trials": range(24), "most_starts": 10}
+    facts |= {"cautions": (), "rescored": False}
     for given in (settings, known, facts):
         given |= {key: changes.pop(key) for key in list(changes) if key in given}
     assert not changes

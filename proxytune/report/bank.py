@@ -1,6 +1,7 @@
 """What a bank says before anything is measured: sentence, table, page and JSON document."""
 
 from collections.abc import Mapping
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,8 @@ from proxytune.report.writing import ABOUT
 from proxytune.study import WITHIN, Bank, settings_document
 
 MOST_NAMED = 3
+ROUGHLY = 1.05
+"""Where a start more widens an interval by more than this factor, widths are not known better."""
 
 
 def bank_sentence(bank: Bank) -> str:
@@ -25,7 +28,12 @@ def bank_sentence(bank: Bank) -> str:
     from_starts = f"{len(bank.settings.agents)} agents measured from {bank.settings.starts} starts"
     if not best:
         return f"{bank.trials} trials are too few to say what {from_starts} would tell; raise budget."
-    return f"{bank.trials} trials: {from_starts} tell {listed(told)}; {listed(best)} tell most."
+    by_starts = [bank.widths(count) for count in bank.expected]
+    rough = [plain(name) for name in widths if any(b[name] > ROUGHLY * a[name] for a, b in pairwise(by_starts))]
+    doubt = (
+        f" More starts seem to tell less of {listed(rough)}: widths are known roughly; raise budget." if rough else ""
+    )
+    return f"{bank.trials} trials: {from_starts} tell {listed(told)}; {listed(best)} tell most.{doubt}"
 
 
 def bank_document(bank: Bank) -> dict[str, Any]:

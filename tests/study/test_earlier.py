@@ -4,6 +4,7 @@ import json
 import re
 import shutil
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from one_line import complaint_of
@@ -11,6 +12,7 @@ from one_line import complaint_of
 from proxytune.api import read_study, run_study
 from proxytune.cli.main import main
 from proxytune.errors import ProxytuneError
+from proxytune.report.bank import bank_sentence
 from proxytune.storage import Store
 from proxytune.study import StudyRun, open_study, read_study_settings
 from proxytune.study.bank import _starts_needed
@@ -46,6 +48,17 @@ def test_more_trials_are_the_same_design_gone_on_with_and_starts_needed_follow_f
     # What trials leave unknown no start makes less.
     assert _starts_needed({1: 0.1, 4: 0.05}, 20) == 10
     assert _starts_needed({1: 0.1, 4: 0.1}, 20) is None
+
+
+def test_a_bank_says_where_more_starts_seem_to_tell_less():
+    def sentence(later):
+        known = {1: {"trim": 0.08}, 3: {"trim": later}}
+        settings = SimpleNamespace(starts=3, agents=("one",))
+        facts = {"widths": known.get, "expected": known, "units": {"trim": ""}, "agents": [("one", 1.0)], "trials": 12}
+        return bank_sentence(SimpleNamespace(**facts, settings=settings))
+
+    assert sentence(0.083).endswith("one tell most.")
+    assert sentence(0.09).endswith("More starts seem to tell less of trim: widths are known roughly; raise budget.")
 
 
 @pytest.fixture(scope="module")

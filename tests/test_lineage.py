@@ -97,8 +97,7 @@ def test_code_that_is_proven_to_play_the_same_episodes_keeps_their_identity(pack
     before = kin.identity
     (package / "effects" / "more.py").write_text("MORE = 1\n")
     assert kin.identity != before
-    known = (*lineage.SAME_CODE[family], lineage.code_meaning(family))
-    monkeypatch.setitem(lineage.SAME_CODE, family, known)
+    monkeypatch.setitem(lineage.SAME_CODE, family, (*lineage.SAME_CODE[family], lineage.code_meaning(family)))
     assert kin.identity == before
 
 

@@ -42,8 +42,7 @@ def swept(study, discrepancy, points=4, base=TRUTH, parameter="trim"):
 
 def test_pod_is_nothing_at_the_truth_and_the_target_is_driven_once_per_start(opened):
     both = opened[1].family
-    at = make_episode(TRUTH, agent="agent0", start=0, seed=3)
-    assert both.run(at) == {"pod_pose": 0.0, "pod_image": 0.0}
+    assert both.run(make_episode(TRUTH, agent="agent0", start=0, seed=3)) == {"pod_pose": 0.0, "pod_image": 0.0}
     off = both.run(make_episode({"trim": -0.1}, agent="agent0", start=0, seed=3))
     assert off["pod_pose"] > 0
     assert off["pod_image"] == pytest.approx(20 / 255), "100 and 120 of 255 grey"
@@ -61,8 +60,7 @@ def test_replays_end_with_the_commands_or_the_episode_of_either_domain(opened):
         replace(both, proxy=counting, target=counting).run(make_episode({}, agent="agent0", start=start, seed=3))
     counted = [len(one.args[1]) for one in counting.replay.mock_calls]
     assert counted == [sweep.COMMANDS, sweep.COMMANDS, 3, 3], "target and proxy in turn"
-    found = both.run(make_episode({"trim": 0.3}, agent="agent0", start=0, seed=3))
-    assert np.isfinite(list(found.values())).all()
+    assert np.isfinite(list(both.run(make_episode({"trim": 0.3}, agent="agent0", start=0, seed=3)).values())).all()
 
 
 def test_identity_tells_targets_and_proxies_apart_and_travels_and_a_missing_model_is_refused(opened, tmp_path):

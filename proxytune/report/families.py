@@ -25,7 +25,7 @@ from proxytune.usefulness import Assessment, Difference
 Row = tuple[str, ...]
 Spread = tuple[float, float | None, float | None]
 """A value and the ends of its interval; None where an end is not known."""
-USES, THETA = "Which simulator, and for what (95 % intervals)", "Best θ of each"
+USES, THETA = "Which simulator, and for what (95 % intervals)", "Best θ of each (95 % region)"
 NOT_APART = "cannot be told from it"
 BEST, ALIKE, WORSE = "best", NOT_APART, "worse"
 LOOKS = {

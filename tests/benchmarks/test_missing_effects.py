@@ -147,8 +147,7 @@ def test_a_case_is_what_its_generator_measured_and_keeps_its_truth_apart(generat
         assert np.isfinite(one.poses[0]).all()
         assert np.isnan(one.poses[1:]).all()
         assert not any(np.array_equal(one.commands, other.commands) for other in case.drives)
-    public = "".join(path.read_text() for path in (tmp_path / "cases").rglob("*") if path.is_file())
-    assert job.case.name not in public
+    assert job.case.name not in "".join(path.read_text() for path in (tmp_path / "cases").rglob("*") if path.is_file())
     truth = json.loads((tmp_path / "truth" / "case.json").read_text())
     assert truth["missing"] == [list(names) for names in job.right]
     assert set(truth["floor_m"]) == {"1", "2", "5"}

@@ -143,8 +143,7 @@ def test_a_picture_a_shown_command_and_whether_on_the_road_belong_to_every_step(
 @pytest.mark.parametrize("side", [-1.0, 1.0])
 def test_the_road_ends_with_the_outer_edges_of_its_two_lanes(heading, side):
     edge, middle = ROAD.lane_offset + ROAD.lane_width / 2, ROAD.size[0] - ROAD.width / 2
-    aside = (0.0, edge - 0.001, edge + 0.001)
-    poses = [np.array((middle + side * way, ROAD.size[0] / 2, heading)) for way in aside]
+    poses = [np.array((middle + side * way, ROAD.size[0] / 2, heading)) for way in (0.0, edge - 0.001, edge + 0.001)]
     assert shown(expert(), poses)[1].on_road == (True, True, False)
 
 
@@ -215,8 +214,7 @@ def test_the_same_lesson_shows_the_same_samples_to_the_last_bit_with_the_picture
 
 def test_another_seed_start_or_theta_shows_other_samples_and_a_lesson_off_the_road_says_where():
     room = classroom(plant="planar")
-    lessons = [episode(), episode(seed=6), episode(start=4), episode(trim=0.1)]
-    shown = [room.demonstrate(one, 1.0)[0] for one in lessons]
+    shown = [room.demonstrate(one, 1.0)[0] for one in [episode(), episode(seed=6), episode(start=4), episode(trim=0.1)]]
     for other in shown[1:]:
         assert (other.commands != shown[0].commands).any()
         assert (other.observations != shown[0].observations).any()

@@ -73,8 +73,7 @@ def tolerance(here):
 @settings(max_examples=20)
 @given(seed=SEEDS)
 def test_distances_are_those_that_the_floor_is_painted_with(name, seed):
-    road = ROADS[name]
-    places = np.random.default_rng(seed).uniform(-0.1, 1.1, (300, 2)) * road.size
+    places = np.random.default_rng(seed).uniform(-0.1, 1.1, (300, 2)) * ROADS[name].size
     shapes = MARKINGS[name].shapes(places)
     for colour in MARKINGS_COLOURS:
         np.testing.assert_allclose(marks(name, colour, places).distance, shapes[colour], atol=1e-9)

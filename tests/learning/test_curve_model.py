@@ -191,8 +191,7 @@ def test_what_a_repetition_does_to_every_learner_is_no_noise_that_more_curves_av
     generator = np.random.default_rng(3)
     plain = marks(np.full(6, 0.5), curves=2)
     together = plain.score + 6.0 * generator.normal(size=6)[plain.repetition]
-    moved = Examined(plain.curve, plain.repetition, plain.place, together)
-    models = [fit_curve_model(one) for one in (plain, moved)]
+    models = [fit_curve_model(one) for one in (plain, Examined(plain.curve, plain.repetition, plain.place, together))]
     before, after = (float(one.mean_curves(np.array([1]), np.array([2.5]))[1][0, 0]) for one in models)
     assert np.sqrt(after) > 1.5 > np.sqrt(before)
 

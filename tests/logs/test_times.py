@@ -38,8 +38,7 @@ def rows(times, poses):
 
 
 def jittered(seed=1, count=200, usual=0.05, by=0.01):
-    random = np.random.default_rng(seed)
-    return 3.0 + np.arange(count) * usual + random.uniform(-by, by, count)
+    return 3.0 + np.arange(count) * usual + np.random.default_rng(seed).uniform(-by, by, count)
 
 
 def test_poses_keep_their_times_and_rate_and_gaps_stay_gaps(folder):

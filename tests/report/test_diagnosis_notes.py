@@ -235,8 +235,7 @@ def test_groups_of_drives_are_told_with_their_gains_and_only_where_they_differ()
     ],
 )
 def test_a_map_of_the_floor_is_told_in_words(group, knots, weights):
-    curve = LearntCurve(group, "forward", knots, weights)
-    theta = learnt_theta(Learnt(FittedRange((0.0, 1.0), (-1.0, 1.0)), (curve,)))
+    theta = learnt_theta(Learnt(FittedRange((0.0, 1.0), (-1.0, 1.0)), (LearntCurve(group, "forward", knots, weights),)))
     notes = learnt_notes(Learning(Discrepancy(theta, {"place on the floor": 1.0}, {}, True), (), False))
     assert "slower by 50 % where x > 0 m" in notes[1]
 

@@ -84,8 +84,7 @@ def test_few_robots_have_intervals_that_hold_the_truth():
 def test_parameters_that_go_together_are_told_and_what_no_robot_tells_stays_open():
     """A planted correlation of 0.9 has an interval well above 0."""
     rng = np.random.default_rng(1)
-    shared = rng.standard_normal((30, 1))
-    theta = 0.5 + 0.12 * (np.sqrt(0.9) * shared + np.sqrt(0.1) * rng.standard_normal((30, 2)))
+    theta = 0.5 + 0.12 * (np.sqrt(0.9) * rng.standard_normal((30, 1)) + np.sqrt(0.1) * rng.standard_normal((30, 2)))
     found = population_of([posterior(one) for one in theta + MEASURED * rng.standard_normal(theta.shape)])
     low, middle, high = summary_of(found.correlation)[:, 0, 1]
     assert 0.4 < low < 0.9 < high

@@ -149,8 +149,7 @@ def test_mmrv_has_every_published_convention():
 
 
 def rolled(rates, rollouts, seed=0):
-    rng = np.random.default_rng(seed)
-    values = (rng.random((len(rates), rollouts)) < np.array(rates)[:, None]).astype(float)
+    values = (np.random.default_rng(seed).random((len(rates), rollouts)) < np.array(rates)[:, None]).astype(float)
     return table_of(values, metrics=("success",))
 
 

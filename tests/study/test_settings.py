@@ -189,6 +189,7 @@ def test_every_mistake_gets_one_line_with_file_and_key(make_study, changes, expe
     told = complaint_of(read_study_settings, folder)
     assert told.startswith(f"{folder / 'study.toml'}: ")
     assert expected in told
+    assert told.count("study.toml: ") == 1
 
 
 def put(folder, *names):

@@ -4,7 +4,7 @@ DataFrames given to the readers of files: there is one way to read, and complain
 """
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -235,9 +235,10 @@ def score(  # type: ignore[misc]  # the options above are those below
 
 
 def _metrics(metrics: str | Metric | Sequence[str | Metric] | None, header: Sequence[str]) -> list[Metric]:
-    given = [metrics] if isinstance(metrics, str | Metric) else [] if metrics is None else metrics
-    if not isinstance(given, Sequence) or not all(isinstance(one, str | Metric) for one in given):
+    given = [metrics] if isinstance(metrics, str | Metric) else metrics or []
+    if not isinstance(given, Iterable):
         raise InputError(f"metrics: must be texts as 'success:max' or of Metric, got {metrics!r}")
+    given = list(given)
     if not given:
         given = [f"{name}:max" for name in both_metrics(header) if "success" in name]
     compared = [

@@ -12,6 +12,7 @@ import fnmatch
 import json
 import math
 import re
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal
@@ -74,12 +75,9 @@ def _json_rows(path: Path) -> list[dict[str, Any]]:
 
 def _each_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     """An object of JSON; a name twice would drop a score."""
-    found = dict(pairs)
-    if len(found) < len(pairs):
-        raise ValueError(
-            f"'{next(name for name in found if sum(n == name for n, _ in pairs) > 1)}' twice in one object"
-        )
-    return found
+    if twice := [name for name, count in Counter(name for name, _ in pairs).items() if count > 1]:
+        raise ValueError(f"'{twice[0]}' twice in one object")
+    return dict(pairs)
 
 
 def _episode(path: Path, agent: str, row: object, place: int) -> dict[str, Any]:

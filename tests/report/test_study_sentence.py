@@ -29,7 +29,7 @@ def study(parameters=(TRIM, PITCH, BLUR), *, names=("trim", "delay"), family=DEF
     known = {"fits": True, "p_value": 0.4, "information": (TOLD_BY_STARTS,), "share": 0.0016}
     facts = {"perfect": True, "inside": True, "floor": FLOOR, "excess": EXCESS, "stopped": "the budget is spent"}
     facts |= {"prpv": PRPV, "nominal": None, "chance": CHANCE, "trials": range(24), "most_starts": 10}
-    facts |= {"cautions": (), "rescored": False}
+    facts |= {"rescored": False}
     for given in (settings, known, facts):
         given |= {key: changes.pop(key) for key in list(changes) if key in given}
     assert not changes
@@ -149,7 +149,7 @@ def test_without_fresh_episodes_or_before_its_end_a_study_says_so_and_how_to_go_
     unconfirmed = said(**ABOVE, fresh=False, confirm=0)
     assert "is 16 in the search's own episodes, which may be partly luck." in unconfirmed
     assert unconfirmed.endswith("Next: set confirm = 1 and run the study again, to drive the best θ afresh.")
-    assert "smaller tolerances" in said(**ABOVE, cautions=["distance:max:500%, leaves no two agents apart: all tie"])
+    assert "smaller tolerances" in said(chance=Chance(0.0, 0.0, 1.0, 1000))
     assert said(**ABOVE, fresh=False, rescored=True).endswith("to a new study, with learn_from = [this one].")
     assert "set confirm" not in said(**ABOVE, fresh=False)
     assert "perfect" not in unconfirmed

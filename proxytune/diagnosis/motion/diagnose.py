@@ -243,21 +243,22 @@ def diagnose(
     rules: Rules = RULES,
     limits: Limits = LIMITS,
     folder: Path | None = None,
-    motion: Theta | None = None,
+    clocks: tuple[Clocks, ...] = (),
 ) -> Diagnosis:
     """Tune what is declared, find what is missing, and test both on drives kept aside, as `diagnose_log` says it.
 
-    Clocks of single drives are read beside the `motion` of a θ if one is given; else beside that of the named effects,
-    once these are found: where there are fewer such clocks then, all is done once more.
+    With `clocks` the logs are on one clock already, and these were theirs. Else they are read, and again beside the
+    motion of the named effects: where fewer drives have another clock then, all is done once more.
 
     Raises:
         LogError: If the log cannot bear the question (too short, no motion, other units), or a declared effect is
             unknown or does not act on motion.
     """
-    declared, given = tuple(declared), (log, test)
+    declared, given, unread = tuple(declared), (log, test), not clocks
     names, parameters = declared_parameters(declared, robot.catalogue), robot.catalogue.parameters
     start = {name: robot.theta.get(name, parameters[name].neutral_value(robot.figures)) for name in names}
-    log, test, clocks = _on_one_clock(*given, robot, motion)
+    if unread:
+        log, test, clocks = _on_one_clock(log, test, robot)
     # An offset of clocks and a delay are one number: where an offset is taken out, the delay is fitted in any case.
     if any(one.offset.value for one in clocks) and "delay" not in names:
         names, start = (*names, "delay"), {**start, "delay": clocks[0].assumed_delay_s}
@@ -272,23 +273,21 @@ def diagnose(
     report("fitting what is declared")
     declared_alone = keep("declared", lambda: fit_declared(parts.fitted, start, names))
     selected = keep("selected", lambda: select_effects(declared_alone, seed, report))
-    if motion is None and any(one.odd for one in clocks):
-        motion = selected.model.theta
-        *_, again = _on_one_clock(*given, robot, motion)
+    if unread and any(one.odd for one in clocks):
+        log_again, test_again, again = _on_one_clock(*given, robot, selected.model.theta)
         if any(one.odd - other.odd for one, other in zip(clocks, again, strict=True)):
             report("clocks are read again beside this model, which moves as if they jumped")
-            log, test = given
             return diagnose(
-                log,
+                log_again,
                 robot,
                 declared,
-                test=test,
+                test=test_again,
                 seed=seed,
                 report=report,
                 rules=rules,
                 limits=limits,
                 folder=folder,
-                motion=motion,
+                clocks=again,
             )
     named = keep("worth", lambda: effect_size.drop_negligible(selected, seed, parts.tested))
     report("fitting to windows of prediction")
@@ -359,12 +358,12 @@ def diagnose(
 
 
 def _on_one_clock(
-    log: Log, test: Log | None, robot: Robot, motion: Theta | None
+    log: Log, test: Log | None, robot: Robot, model: Theta | None = None
 ) -> tuple[Log, Log | None, tuple[Clocks, ...]]:
-    log, own = on_one_clock(log, robot, model=motion)
+    log, own = on_one_clock(log, robot, model=model)
     if test is None:
         return log, None, (own,)
-    test, other = on_one_clock(test, robot, own, motion)
+    test, other = on_one_clock(test, robot, own, model)
     return log, test, (own, other)
 
 

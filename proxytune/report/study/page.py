@@ -138,8 +138,7 @@ def _prpv_rows(result: StudyResult) -> Rows:
         return [("PRPV", "–", "", failed), (IN_SEARCH, value, "", pairs)]
     optimism, others = confirmation.answer.optimism or 0.0, len(confirmation.candidates) - 1
     luck = f"{optimism:.3g} lower by luck" if optimism > 0.0 else "no optimism"
-    if result.study.settings.objective != "prpv":
-        luck = pairs  # luck is of what was searched by
+    luck = luck if result.study.settings.objective == "prpv" else pairs  # luck is of what was searched by
     rivals = f"; {others} runner{'' if others == 1 else 's'}-up re-run as well" if others else ""
     count = f"in {expected.repetitions} more run{'s' if expected.repetitions > 1 else ''}"
     told = fixed(expected.prpv.value.value, 0), pairs_span(*expected.prpv.value[1:])

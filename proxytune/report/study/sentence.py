@@ -117,8 +117,8 @@ def say_next_step(result: StudyResult) -> str:
         effects = declared_of(settings.space.names)
         declared = f" --declared {','.join(effects)}" if effects else ""
         return f"log drives of the target (a model's: `record`) and run `python -m proxytune diagnose LOG{declared}`"
-    if any("all tie" in line for line in result.cautions):
-        return "give smaller tolerances: with these all agents tie, whatever θ is"
+    if result.judged.chance.explains and result.judged.chance.mean == 0.0:
+        return "give smaller tolerances, or other agents: of these no two are apart, whatever θ is"
     if result.judged.chance.explains:
         return f"{_more_trials(result)}, or add agents whose scores differ more"
     if not _is_fresh(result) and result.rescored:

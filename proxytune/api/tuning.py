@@ -174,6 +174,9 @@ def _known(study: Study, known: pd.DataFrame | Iterable[Theta]) -> list[Outcome 
         where = f"known: row {place}"
         if missing := [name for name in space.names if name not in row]:
             raise InputError(f"{where}: has no '{missing[0]}'; give each parameter of the box")
+        if not isinstance(known, pd.DataFrame) and (others := [name for name in row if name not in space.names]):
+            hint = nearest(str(others[0]), space.names)
+            raise InputError(f"{where}: '{others[0]}' is no parameter of the box; {hint}")
         theta = {one.name: float(row[one.name]) for one in space.intervals}
         for one in space.intervals:
             if not one.low <= theta[one.name] <= one.high:

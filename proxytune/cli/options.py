@@ -85,7 +85,7 @@ def study_folder(path: Path) -> Path:
     Where there is none and its last part names a study that comes with the package, that study is copied there.
     """
     folder = path.parent if path.name == FILE_NAME else path
-    if study_around(folder, FILE_NAME) is not None:
+    if study_around(folder) is not None:
         return folder
     if folder.exists():
         if not (folder / FILE_NAME).is_file():

@@ -9,7 +9,7 @@ from .episode import (
     Drive as Drive,
     Instance as Instance,
     Sight as Sight,
-    check_command as check_command,
+    command_of as command_of,
     measured as measured,
     score_trajectory as score_trajectory,
     start_pose as start_pose,

@@ -204,20 +204,24 @@ def ask(driver: Driver, seen: Any, memory: Any, time_s: float) -> tuple[Command,
     """A driver's next command and memory; refused, with the time [s], where it raises or these are none."""
     try:
         answer, memory = driver.act(seen, memory)
-        command = np.asarray(answer, dtype=float)
     except Exception as problem:
         raise EpisodeError(f"raised {type(problem).__name__} at {time_s:.2f} s: {problem}") from problem
-    check_command(command, time_s)
-    return command, memory
+    return command_of(answer, time_s), memory
 
 
-def check_command(command: Command, time_s: float) -> None:
-    """Refuse what are not two finite duties, with the time [s]."""
+def command_of(answer: Any, time_s: float) -> Command:
+    """An answer as a command; refused, with the time [s], where it is not two finite duties."""
+    try:
+        command = np.asarray(answer, dtype=float)
+    except Exception as problem:
+        told = f"answered with a {type(answer).__name__} at {time_s:.2f} s: {problem}"
+        raise EpisodeError(f"{told}; a command is two duties, left and right") from problem
     if command.shape != (2,):
         told = f"answered with shape {command.shape} at {time_s:.2f} s"
         raise EpisodeError(f"{told}; a command is two duties, left and right")
     if not (math.isfinite(command[0]) and math.isfinite(command[1])):
         raise EpisodeError(f"answered {command.tolist()} at {time_s:.2f} s; duties must be finite")
+    return command
 
 
 METRICS: Mapping[str, str] = MappingProxyType(

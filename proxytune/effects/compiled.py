@@ -116,6 +116,28 @@ def _step(signal, now, limits, out):  # type: ignore[no-untyped-def]
                 out[row, sample, limit] = now[row, limit]
 
 
+def ramps(wanted: NDArray[Any], start: NDArray[Any], step: float) -> NDArray[Any]:
+    """Follow rows (rows, time) from where each starts by one step a sample at most, in one ramp while a value holds."""
+    reached = np.array(wanted, dtype=float, order="C")
+    _slew(np.array(start, dtype=float), step, reached)
+    return reached
+
+
+def _follow_steps(start, step, rows):  # type: ignore[no-untyped-def]
+    for row in range(rows.shape[0]):
+        here, value, held = start[row], rows[row, 0], 0
+        gap = here - value
+        for sample in range(rows.shape[1]):
+            if rows[row, sample] != value:
+                reach = held * step
+                here = value + (gap - reach if gap > reach else gap + reach if gap < -reach else 0.0)
+                value, held = rows[row, sample], 0
+                gap = here - value
+            held += 1
+            sign = 1.0 if gap > 0.0 else -1.0 if gap < 0.0 else 0.0
+            rows[row, sample] = value + sign * max(0.0, abs(gap) - held * step)
+
+
 # Signatures are compiled on import, which finds out whether Numba works here. No fast mathematics: it changes bits
 _compiled: dict[str, Any] = {"nopython": True, "nogil": True, "cache": True, "error_model": "numpy"}
 _ROWS, _LAST = "float64[:,:,:]", "float64[:,::1]"
@@ -124,4 +146,5 @@ _TABLE = "float64[:,:]"
 _near = numba.jit(f"void({_TABLE}, {_TABLE}, float64[::1], float64[:,::1])", **_compiled)(_come_near)
 _switch = numba.jit(f"void({_ROWS}, {_LAST}, {_LAST}, boolean[:,::1], float64[:,:,::1])", **_compiled)(_pass)
 _drag = numba.jit(f"void({_TABLE}, {_LAST}, float64[::1], float64[:,:,::1])", **_compiled)(_pull)
+_slew = numba.jit(f"void(float64[::1], float64, {_LAST})", **_compiled)(_follow_steps)
 _climb = numba.jit(f"void({_TABLE}, {_LAST}, {_LAST}, float64[:,:,::1])", **_compiled)(_step)

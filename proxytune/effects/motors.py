@@ -22,6 +22,7 @@ from proxytune.effects.effect import (
     Trace,
     WheelCurve,
     effect,
+    fastest,
     like,
     low_pass,
     low_pass_at,
@@ -173,6 +174,8 @@ class SlewRate(ShippedEffect):
 
 def _ramps(wanted: Signal, start: Signal, step: float) -> Signal:
     """Each row (rows, time) followed by one step a sample at most: one ramp for each change of what is wanted."""
+    if wanted.size and (compiled := fastest(wanted.size)):
+        return compiled.ramps(wanted, start, step)  # type: ignore[no-any-return]
     begins = np.flatnonzero(np.diff(wanted, axis=1, prepend=np.nan))
     lengths = np.diff(begins, append=wanted.size)
     held = wanted.ravel()[begins]

@@ -238,8 +238,7 @@ class LaneFollowingEnv(gymnasium.Env[driving.Picture, NDArray[Any]]):
         drive = self._under_way()
         if self._over:
             raise InputError("the episode is over; call reset() for another one")
-        command = np.asarray(action, dtype=float)
-        driving.check_command(command, self._step / self._control_hz)
+        command = driving.command_of(action, self._step / self._control_hz)
         drive.rollouts.step(command[None])
         self._step += 1
         [poses], [crashed] = drive.rollouts.poses, drive.rollouts.crashed

@@ -24,6 +24,7 @@ from proxytune.settings import nearest
 
 GROUP = "proxytune"
 """The group of entry points; each is called `KIND.NAME`."""
+KINDS = ("agent", "effect", "engine", "environment", "family", "learner", "measure", "robot")
 
 
 def plugins(kind: str, shipped: Collection[str] = ()) -> Mapping[str, EntryPoint]:
@@ -34,11 +35,14 @@ def plugins(kind: str, shipped: Collection[str] = ()) -> Mapping[str, EntryPoint
         shipped: Names that proxytune itself has of that kind.
 
     Raises:
-        ExtensionError: If two have one name, or one is called like something shipped.
+        ExtensionError: If two have one name, one is called like something shipped, or one is of no known kind.
     """
     found: dict[str, EntryPoint] = {}
     for point in _installed(_path()):
         of_kind, _, name = point.name.partition(".")
+        if of_kind not in KINDS:
+            whose = f"plug-in '{point.name}' of {_package(point)}"
+            raise ExtensionError(f"{whose} must be called KIND.NAME; {nearest(of_kind, KINDS)}")
         if of_kind != kind:
             continue
         if not name.replace("-", "_").isidentifier():

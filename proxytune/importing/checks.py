@@ -13,6 +13,7 @@ from scipy.signal import correlate, correlation_lags
 from proxytune.arrays import Flags, Floats
 from proxytune.errors import LogError
 from proxytune.importing.source import Commands, Drive, Poses
+from proxytune.logs import LARGEST
 
 FASTEST_M_S = 40.0
 """No wheeled robot drives faster."""
@@ -159,9 +160,6 @@ def _check_sizes(parts: tuple[Floats, ...], what: str, about: str) -> None:
     large = values[np.abs(values) > LARGEST]  # NaN is none: what was not measured is told of elsewhere
     if len(large):
         raise LogError(f"{about}: its {what} hold the number {large[0]:g}; leave out what was not measured")
-
-
-LARGEST = 1e50
 
 
 def _ordered_poses(poses: Poses, about: str) -> tuple[Poses, list[str]]:

@@ -13,4 +13,5 @@ from .log import (
 from .outliers import without_outliers as without_outliers
 from .reading import read_commands as read_commands, read_log as read_log
 from .repeats import rows_of_poses as rows_of_poses
+from .rows import LARGEST as LARGEST
 from .windows import join_windows as join_windows

@@ -99,11 +99,11 @@ FEWEST = 2
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}")
 
 
-def study_around(folder: Path, file_name: str) -> Path | None:
+def study_around(folder: Path) -> Path | None:
     """The study.toml of which this folder is a family's; None if it is none."""
     home = folder if folder.name and folder.parent.name else folder.absolute()
-    around = home.parent.parent / file_name
-    own = (home / file_name).exists()
+    around = home.parent.parent / FILE_NAME
+    own = (home / FILE_NAME).exists()
     return around if home.parent.name == FAMILIES and not own and around.is_file() else None
 
 
@@ -230,7 +230,7 @@ def read_study_settings(path: Path) -> StudySettings:
     Raises:
         SettingsError: With file, key and remedy.
     """
-    if (around := study_around(path, FILE_NAME)) is not None:
+    if (around := study_around(path)) is not None:
         study, name = read_study_settings(around), path.absolute().name
         if name not in study.families:
             raise study.error(FAMILIES, f"has no '{name}', as {path} is called; {nearest(name, study.families)}")

@@ -12,6 +12,7 @@ from hypothesis import given, settings, strategies as st
 from proxytune.effects import FilterContext, compiled, effect
 from proxytune.effects.effect import FEW, low_pass, low_pass_at, reckon, start_reckoning
 from proxytune.effects.features import play, ramp
+from proxytune.effects.motors import SlewRate, SlewState
 
 
 def test_beyond_what_is_known_the_rates_lead_on_in_chunks_as_in_one():
@@ -60,8 +61,11 @@ def test_many_samples_follow_to_the_last_bit_as_compiled(length, channels, batch
             patched.setattr(effect, "_filtered", [used])
             mean, end = low_pass(signal, state)
             first = effect.approach(signal[..., 0], np.exp(-(signal[..., 0] ** 2)), state.value[..., 0])
+            slewed = SlewRate(lasts / 4.0).apply(signal[..., :2].round(), SlewState(state.value[..., :2], lasts / 20.0))
             dragged = play(signal[..., 0], state.value, widths), ramp(signal[..., 0], state.value, widths, 0.5 - widths)
-        ways.append(([one.tobytes() for one in (*first, *dragged, mean, end.value)], end.value.shape, end[1:]))
+        ways.append(
+            ([one.tobytes() for one in (*first, slewed[0], *dragged, mean, end.value)], end.value.shape, end[1:])
+        )
     assert ways[0] == ways[1]
 
 

@@ -281,6 +281,8 @@ def test_an_action_that_is_no_command_is_refused_with_its_time_and_a_step_withou
         env.step((np.nan, 0.1))
     with pytest.raises(EpisodeError, match=r"shape \(3,\)"):
         env.step((0.1, 0.1, 0.1))
+    with pytest.raises(EpisodeError, match="answered with a str at 0.05 s"):
+        env.step("ab")
     env = make(seconds=1.0)
     assert "call reset" in complaint_of(env.step, (0.1, 0.1))
     episode_of(env, [(0.0, 0.0)] * 30, seed=0)

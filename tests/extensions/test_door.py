@@ -176,13 +176,14 @@ def test_a_plugin_is_loaded_by_its_name_and_listed(install, write, tmp_path):
 CLASHES = {
     "quick": "'agent.quick' is in both fast_agents and slow_agents; uninstall one",
     "steady": "'agent.steady' of fast_agents has the name of a shipped agent; rename",
+    "agents.quick": "'agents.quick' of fast_agents must be called KIND.NAME; did you mean 'agent'?",
     "very.quick": "'agent.very.quick' of fast_agents must be called agent.NAME, one word",
 }
 
 
 @pytest.mark.parametrize("name", CLASHES)
 def test_a_plugin_is_refused_whose_name_another_or_something_shipped_has_or_that_is_no_one_word(install, name):
-    install("fast_agents", f"agent.{name} = a:b")
+    install("fast_agents", f"{'' if name.startswith('agents') else 'agent.'}{name} = a:b")
     if name == "quick":
         install("slow_agents", "agent.quick = c:d")
     assert CLASHES[name] in complaint_of(partial(load, kind="agent", shipped=SHIPPED), name)

@@ -168,6 +168,21 @@ def test_what_is_wrong_is_one_sentence_with_what_to_do(found, says):
     assert any(word in note for word in ("Stamp both", "Check how", "Keep clocks"))
 
 
+@pytest.mark.parametrize(
+    ("changes", "says"),
+    [
+        ({"verdict": "unexplained"}, "what no effect explains can look like clocks"),
+        ({"effects": (replace(BAND, effect="delay_jitter"),)}, "chance in when commands act can look like clocks"),
+        ({}, ""),
+    ],
+)
+def test_clocks_of_single_drives_are_doubted_beside_what_may_look_so(changes, says):
+    odd = clocks(drives={"b": Offset(0.3, (0.28, 0.32))})
+    for own, said in (odd, says), (clocks(), ""):
+        told = motion_notes(diagnosis(clocks=(own,), **changes))
+        assert [note for note in told if "look like" in note] == [note for note in told if said and said in note]
+
+
 RATIO = Ratio(0.5, (0.4, 0.6))
 ERROR = LearntError(2.0, Rmse(0.01, (0.009, 0.011)), Rmse(0.02, (0.01, 0.03)), RATIO)
 THETA = {"learnt.turn_rate.yaw@1.0": 0.1}

@@ -5,7 +5,17 @@ from typing import Any
 
 import numpy as np
 
-from proxytune.diagnosis import AdoptedEffect, Clocks, Diagnosis, EffectSize, Learning, Offset, Ratio, RobotClusters
+from proxytune.diagnosis import (
+    RANDOM_EFFECTS,
+    AdoptedEffect,
+    Clocks,
+    Diagnosis,
+    EffectSize,
+    Learning,
+    Offset,
+    Ratio,
+    RobotClusters,
+)
 from proxytune.effects import PLACE, is_learnt, learnt_effect
 from proxytune.files import package_table
 from proxytune.report.wording import fixed, listed, percent
@@ -37,6 +47,10 @@ def told(found: str, beside: str, verdict: str) -> str:
 def motion_notes(diagnosis: Diagnosis) -> list[str]:
     """Everything that the tables do not hold, a line each."""
     lines = clocks_notes(diagnosis.log, diagnosis.clocks, diagnosis.theta)
+    draws = any(effect.effect in RANDOM_EFFECTS for effect in diagnosis.effects)
+    if any(clocks.odd for clocks in diagnosis.clocks) and (draws or diagnosis.verdict != "explained"):
+        cause = "chance in when commands act" if draws else "what no effect explains"
+        lines.append(f"beware: {cause} can look like clocks of single drives; check how these were set")
     lines += unlike_notes(diagnosis.robot_clusters, diagnosis.drive_names)
     lines += [_say_added(diagnosis, effect) for effect in diagnosis.effects]
     lines += moves_from(diagnosis)

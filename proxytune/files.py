@@ -162,10 +162,7 @@ def write_whole(
 def temporary_folder() -> Iterator[Path]:
     """A folder for the moment, where the system has such; those that killed processes have left are removed.
 
-    It is locked, which ends with the process, however that ends.
-
-    Raises:
-        OSError: If it cannot be made.
+    It is locked, which ends with the process, however that ends. An OSError if it cannot be made.
     """
     place = Path(tempfile.gettempdir())
     for name in os.listdir(place):
@@ -215,11 +212,7 @@ def _to_disk(draft: Path) -> None:
 
 
 def shipped(kind: str) -> Path:
-    """The folder `robots` or `studies`: within an installed package, or beside the package in a checkout.
-
-    Raises:
-        SettingsError: If the installation has lost the folder.
-    """
+    """The folder `robots` or `studies`, of an installed package or a checkout; a SettingsError if it is lost."""
     package = Path(__file__).resolve().parent
     for home in (package, package.parent):
         if (home / kind).is_dir():

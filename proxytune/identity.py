@@ -34,11 +34,7 @@ def digest(*values: object, length: int = 16) -> str:
 
 
 def meaning_of(paths: Iterable[Path], root: Path) -> str:
-    """A digest of what files mean and of their names within a folder, whatever the order in which they are given.
-
-    Raises:
-        OSError: If one cannot be read.
-    """
+    """A digest of what files mean and of their names within a folder, in any order; an OSError if one is unreadable."""
     parts = {path.relative_to(root).as_posix(): _meaning(path.suffix, path.read_bytes()) for path in paths}
     return hashlib.sha256(repr(sorted(parts.items())).encode()).hexdigest()
 

@@ -219,11 +219,7 @@ class Section:
 
 
 def read_settings(path: Path) -> Section:
-    """Read a TOML file.
-
-    Raises:
-        SettingsError: If the file is missing, unreadable or not TOML.
-    """
+    """Read a TOML file; a SettingsError if it is missing, unreadable or not TOML."""
     try:
         text = read_text(path, "utf-8-sig", usual_mb=SETTINGS_MB)
         for number, line in enumerate(text.splitlines(), start=1):
@@ -257,11 +253,7 @@ NO_CSV = "is not a CSV file; save it as comma-separated text (UTF-8)"
 
 
 def pairs_in(option: str, text: str, shape: str) -> dict[str, str]:
-    """Values by name of an option, NAME=VALUE,NAME=VALUE.
-
-    Raises:
-        InputError: If a part is not of this shape, or a name is given twice.
-    """
+    """Values by name of an option, NAME=VALUE,NAME=VALUE; an InputError at other shapes, or a name given twice."""
     pairs: dict[str, str] = {}
     for part in filter(None, map(str.strip, text.split(","))):
         name, _, value = map(str.strip, part.partition("="))
@@ -316,11 +308,7 @@ def check_end(path: Path, usual_mb: float = TEXT_MB) -> None:
 
 
 def allowed_bytes(usual_mb: float) -> float:
-    """The bytes that something may have, or unpack to.
-
-    Raises:
-        InputError: If the environment variable that raises the limit is no number.
-    """
+    """The bytes that something may have, or unpack to; an InputError if what raises the limit is no number."""
     stated = os.environ.get(LARGEST, "0")
     try:
         return 1e6 * max(usual_mb, float(stated))

@@ -54,11 +54,7 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Interval:
-    """One side of a search box.
-
-    Raises:
-        SettingsError: If a bound is not finite or the bounds are reversed, or equal but for rounding.
-    """
+    """One side of a search box; a SettingsError if bounds are not finite, reversed, or equal but for rounding."""
 
     name: str
     low: float

@@ -74,10 +74,8 @@ def choose_theta(
 ) -> tuple[Theta, str]:
     """θ as an option has it, and where from: "best", "nominal" or "given".
 
-    Without an option it is the study's best, or the nominal one as long as no trial is finished.
-
-    Raises:
-        InputError: If the text is no θ, the model is of another robot, or the study has no best θ.
+    Without an option it is the study's best, or the nominal one as long as no trial is finished. An InputError if the
+    text is no θ, the model is of another robot, or the study has no best θ.
     """
     if text == "best" or (text is None and (settings.home / DATABASE).is_file()):
         study = studies.open_settings(settings)
@@ -87,11 +85,7 @@ def choose_theta(
 
 
 def given_theta(text: str | None, settings: studies.StudySettings, family: DomainFamily, option: str) -> Theta:
-    """θ from NAME=VALUE pairs or a model.toml of the family's robot; none for `nominal`.
-
-    Raises:
-        InputError: If it is neither, or the model is of another robot.
-    """
+    """θ from NAME=VALUE pairs or a model.toml of the family's robot, else an InputError; none for `nominal`."""
     if text is not None and text.endswith(".toml"):
         studies.check_robot(family, Path(text), option)
         if (own := getattr(family, "truth", None)) is not None:
@@ -101,11 +95,7 @@ def given_theta(text: str | None, settings: studies.StudySettings, family: Domai
 
 
 def read_theta(text: str | None, catalogue: Catalogue = SHIPPED, option: str = "--at") -> Theta:
-    """θ from NAME=VALUE pairs or a model.toml; none for `nominal`.
-
-    Raises:
-        InputError: If it is neither.
-    """
+    """θ from NAME=VALUE pairs or a model.toml, else an InputError; none for `nominal`."""
     if text is None or text == "nominal":
         return {}
     if text.endswith(".toml"):

@@ -31,11 +31,7 @@ class Wanted:
 
 
 def recordable(settings: StudySettings, model: Path) -> LaneFollowing:
-    """The domain of a model, by a study's [domain].
-
-    Raises:
-        InputError: If it cannot be recorded.
-    """
+    """The domain of a model, by a study's [domain]; an InputError if it cannot be recorded."""
     family = bare_family(settings, model)
     if not isinstance(family, LaneFollowing):
         raise InputError(f"{settings.folder}: only the lane-following family can be recorded; give another study")

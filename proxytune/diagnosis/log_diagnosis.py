@@ -150,11 +150,7 @@ def predict_pictures(log: Log, robot: Robot, theta: Theta) -> Iterator[Predicted
 
 
 def frames_of(log: Log) -> Frames:
-    """Give the log's frames.
-
-    Raises:
-        LogError: If it has none.
-    """
+    """Give the log's frames; a LogError if it has none."""
     if log.frames is None:
         raise LogError(f"{log.name}: has no frames to predict; add [camera] to log.toml, or leave --frames out")
     return log.frames

@@ -153,9 +153,7 @@ class _Lap(NamedTuple):
 def film(family: driving.LaneFollowing, frames: int, seed: int) -> Iterator[FilmedDrive]:
     """Let the robot's expert drive from every start, then from each the other way, and take so many pictures in all.
 
-    Raises:
-        SettingsError: If the robot has no expert or no camera, before anything is driven.
-        EpisodeError: From the drives, if one ends before its pictures are taken.
+    A SettingsError without expert or camera, before anything is driven; an EpisodeError from a drive that ends early.
     """
     instance = family.instance({}, columns=COLUMNS)
     instance.robot.expert_figures()

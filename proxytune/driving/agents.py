@@ -384,9 +384,5 @@ NEEDS = ("begin", "act")
 
 
 def load_agent(name: str, folder: Path) -> Agent:
-    """The agent of this name: a key of AGENTS, a plug-in, or `module:attribute`, an agent or what makes one.
-
-    Raises:
-        ExtensionError: If there is no such agent.
-    """
+    """The agent of this name: of AGENTS, a plug-in, or `module:attribute`; an ExtensionError if there is none."""
     return cast(Agent, load(name, kind="agent", beside=folder, needs=NEEDS, shipped=AGENTS, call=True))

@@ -74,11 +74,7 @@ _RATE_HZ = 60.0
 
 
 def mounted_camera(robot: Robot, effects: Iterable[Effect]) -> CameraFigures:
-    """The robot's nominal camera with the figures that camera effects set.
-
-    Raises:
-        SettingsError: If the robot has no camera, or no camera can have these figures.
-    """
+    """The robot's nominal camera with what camera effects set; a SettingsError if there is none, or can be none."""
     figures = robot.camera_figures()
     nominal = figures.channels()
     mounting = stage_chain(effects, Stage.CAMERA)

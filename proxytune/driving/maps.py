@@ -111,11 +111,7 @@ def map_names() -> tuple[str, ...]:
 
 @functools.lru_cache
 def shipped_map(name: str) -> Road:
-    """A map that travels with the package.
-
-    Raises:
-        SettingsError: If there is no such map.
-    """
+    """A map that travels with the package; a SettingsError if there is none of this name."""
     if name not in map_names():
         raise SettingsError(f"map '{name}' is unknown; {nearest(name, map_names())}")
     return read_map(shipped("robots") / "maps" / f"{name}.toml")
@@ -133,11 +129,7 @@ def chosen_map(section: Section) -> Road:
 
 
 def read_map(path: Path) -> Road:
-    """Read a map from its file.
-
-    Raises:
-        SettingsError: If a key is missing, unknown or impossible, or the road is none that can be driven.
-    """
+    """Read a map from its file; a SettingsError if a key is wrong, or the road is none that can be driven."""
     settings = read_settings(path)
     settings.only(("format", "description", "size", "starts", "road", "paint"))
     settings.whole("format", low=1, high=1)

@@ -18,11 +18,7 @@ SKY = (115, 209, 255)
 
 @dataclass(frozen=True)
 class CameraFigures:
-    """Figures of how a camera is made and mounted.
-
-    Raises:
-        SettingsError: If no camera can have these figures.
-    """
+    """Figures of how a camera is made and mounted; a SettingsError if no camera can have these."""
 
     columns: int  # width of a picture [pixel]
     rows: int  # height of a picture [pixel]

@@ -146,11 +146,7 @@ class Body:
 
 
 def parse_urdf(path: Path) -> ET.Element:
-    """The root element of a URDF.
-
-    Raises:
-        SettingsError: If it cannot be read or is no URDF.
-    """
+    """The root element of a URDF; a SettingsError if it cannot be read or is no URDF."""
     try:
         root = ET.fromstring(read_text(path))
     except (OSError, UnicodeDecodeError) as problem:
@@ -163,11 +159,7 @@ def parse_urdf(path: Path) -> ET.Element:
 
 
 def read_body(root: ET.Element, path: Path) -> Body:
-    """Read a URDF's wheels, mass and camera.
-
-    Raises:
-        SettingsError: If its two driven wheels cannot be told, or a number in it is none.
-    """
+    """Read a URDF's wheels, mass and camera; a SettingsError if its driven wheels or a number cannot be told."""
     with sound_urdf(path):
         wheels = [_wheel(root, joint) for joint in root.iter("joint") if joint.get("type") == "continuous"]
         across = [wheel for wheel in wheels if abs(wheel.axis[1]) > ACROSS]
@@ -185,11 +177,7 @@ def read_body(root: ET.Element, path: Path) -> Body:
 
 @contextmanager
 def sound_urdf(path: Path) -> Iterator[None]:
-    """Whatever is read or changed of a URDF, one line where a number in it is none.
-
-    Raises:
-        SettingsError: If one is none, or its joints go round in a circle.
-    """
+    """Whatever is read or changed of a URDF; a SettingsError if a number in it is none, or joints go in a circle."""
     try:
         yield
     except (ValueError, RecursionError) as problem:

@@ -160,9 +160,7 @@ def _folder_of(name: str, folder: Path | None) -> Path | None:
 def robot_home(name: str, folder: Path | None = None) -> Path:
     """The folder of a robot: in the study's folder first, then beside it, then shipped, then what a plug-in names.
 
-    Raises:
-        SettingsError: If there is no such robot.
-        ExtensionError: If its plug-in cannot be used.
+    A SettingsError if there is no such robot, an ExtensionError if its plug-in cannot be used.
     """
     if own := _folder_of(name, folder):
         return own
@@ -206,11 +204,7 @@ def catalogue_of(robot: str, folder: Path | None, own: tuple[str, ...] = ()) -> 
 
 
 def read_model_of(path: Path, folder: Path | None) -> Model:
-    """Read a model.toml with the effects that its robot may have.
-
-    Raises:
-        SettingsError: With file, key and remedy.
-    """
+    """Read a model.toml with the effects that its robot may have; a SettingsError tells file, key and remedy."""
     named = read_settings(path).values.get("robot")
     return read_model(path, catalogue_of(named if isinstance(named, str) else "", folder))
 

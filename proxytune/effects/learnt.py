@@ -273,11 +273,7 @@ def learnt_theta(effect: Learnt) -> dict[str, float]:
 
 
 def learnt_effect(theta: Theta) -> Learnt | None:
-    """The learnt effect that θ names, or None.
-
-    Raises:
-        SettingsError: If names or values do not make one.
-    """
+    """The learnt effect that θ names, or None; a SettingsError if names or values do not make one."""
     named = {name: float(value) for name, value in theta.items() if is_learnt(name)}
     if not named:
         return None

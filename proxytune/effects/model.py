@@ -40,11 +40,7 @@ class Model:
 
 
 def read_model(path: Path, catalogue: Catalogue = SHIPPED) -> Model:
-    """Read a model.toml, which may name effects of a catalogue.
-
-    Raises:
-        SettingsError: With file, key and remedy.
-    """
+    """Read a model.toml, which may name effects of a catalogue; a SettingsError tells file, key and remedy."""
     settings = read_settings(path)
     settings.only(("format", "robot", "plant", "geometry", "effects"))
     settings.whole("format", 1, low=1, high=1)
@@ -72,10 +68,7 @@ def read_effects(
 ) -> tuple[dict[str, float], dict[str, tuple[float, float]]]:
     """Values and intervals from `[effects.NAME]` tables: a parameter is a number, or a table with `value`.
 
-    A user's own effect is a quoted key: `[effects."yaw_drift:YawDrift"]`.
-
-    Raises:
-        SettingsError: With file, key and remedy.
+    A user's own effect is a quoted key, `[effects."yaw_drift:YawDrift"]`. A SettingsError tells file, key and remedy.
     """
     theta: dict[str, float] = {}
     intervals: dict[str, tuple[float, float]] = {}

@@ -45,11 +45,7 @@ class Interrupted(KeyboardInterrupt):
 
 
 def interrupt(number: int, frame: FrameType | None) -> None:
-    """Handle SIGINT on the command line.
-
-    Raises:
-        Interrupted: Always.
-    """
+    """Handle SIGINT on the command line: raise Interrupted."""
     raise Interrupted
 
 

@@ -156,11 +156,7 @@ def ask(
 
 
 def require(found: Any, needs: Iterable[str], *, name: str, kind: str) -> None:
-    """Refuse a thing that is not what its name claims.
-
-    Raises:
-        ExtensionError: If it lacks any of these members.
-    """
+    """Refuse by an ExtensionError a thing that is not what its name claims: it lacks one of these members."""
     if lacks := _lacks(found, needs):
         raise ExtensionError(f"{kind} '{name}' lacks {', '.join(lacks)}; add what every {kind} must have")
 

@@ -130,12 +130,8 @@ PICTURES = "frames/%06d.png"
 def write_log(source: Source, folder: Path, facts: Facts, origin: str) -> Log:
     """Write log.toml with where it came from, samples.csv, commands.csv and pictures; gives the log that it reads as.
 
-    The folder must not exist or be empty, or else be this very log.
-
-    Raises:
-        InputError: If the folder is not free.
-        LogError: If what was read makes no log.
-        RunError: If it cannot be written.
+    The folder must not exist or be empty, or else be this very log: an InputError. A LogError if what was read makes no
+    log, a RunError if it cannot be written.
     """
     folder = folder.resolve()
     with writable(folder), folder_draft_of(folder) as draft:

@@ -136,10 +136,8 @@ class Cache:
     def get(self, kind: str, facts: Mapping[str, Any], make: Callable[[], Arrays]) -> Arrays:
         """The arrays that these facts determine, made and kept where they are not there yet.
 
-        A file is whole or not there at all, so several processes may use one cache, and a killed one leaves no harm.
-
-        Raises:
-            StoreError: If the folder cannot be written, or a file in it is damaged.
+        A file is whole or not there at all, so several processes may use one cache, and a killed one leaves no harm. A
+        StoreError if the folder cannot be written, or a file in it is damaged.
         """
         path = self.path(kind, facts)
         if not path.exists():
@@ -183,11 +181,7 @@ def _read(path: Path) -> Arrays:
 
 
 def examine_policy(classroom: Classroom, episodes: Sequence[Episode], policy: Policy) -> list[float]:
-    """The score of a policy in each episode, all at once where the classroom can do that.
-
-    Raises:
-        EpisodeError: If the domain or the policy fails, or a score is missing or no finite number.
-    """
+    """The score of a policy in each episode, together where that can be; an EpisodeError where one has none."""
     if (together := getattr(classroom, "examine_together", None)) is None:
         scores = [classroom.examine(episode, policy) for episode in episodes]
     else:

@@ -74,11 +74,7 @@ class TeachingSettings:
 
 
 def read_teaching(section: Section) -> TeachingSettings | None:
-    """Read the table; None where there is none.
-
-    Raises:
-        SettingsError: With file, key and remedy.
-    """
+    """Read the table, None where there is none; a SettingsError tells file, key and remedy."""
     if not section.values:
         return None
     section.only(KEYS)

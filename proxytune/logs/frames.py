@@ -163,11 +163,8 @@ BROKEN = (OSError, SyntaxError, ValueError, EOFError, struct.error, zlib.error, 
 def read_pictures(frames: Frames, numbers: Sequence[int], columns: int = 160) -> Pictures:
     """Read n of a log's pictures by their places in `frames`: red, green and blue (n, rows, columns, 3), 0 to 255.
 
-    Wider ones are averaged down to so many columns.
-
-    Raises:
-        LogError: If a file cannot be read, or is of another size than the first.
-        InputError: If a picture, or all of them, would take more memory than is allowed.
+    Wider ones are averaged down to so many columns. A LogError if a file cannot be read, or is of another size than the
+    first; an InputError if they would take more memory than is allowed.
     """
     pictures, first = np.empty((0, 0, 0, 3), dtype=np.uint8), (0, 0)
     for place, number in enumerate(numbers):

@@ -133,9 +133,7 @@ class Loop:
 def open_loop(path: Path, twin: Path | None = None, log: Path | None = None) -> Loop:
     """Read a study and check it, its twin (its `truth` if not given), its log and its held-out agents.
 
-    Raises:
-        InputError: If any of them cannot be used.
-        StoreError: If the loop's folder cannot be written.
+    An InputError if one of them cannot be used, a StoreError if the loop's folder cannot be written.
     """
     settings = study.read_study_settings(path)
     if settings.families or settings.family_name:

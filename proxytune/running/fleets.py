@@ -27,11 +27,7 @@ OF_THE_MACHINE = (errno.ENOSPC, errno.EDQUOT, errno.ENOMEM, errno.EMFILE, errno.
 
 
 def run_fleet(family: DomainFamily, episodes: Sequence[Episode], needed: Collection[str] = ()) -> list[Outcome]:
-    """Run episodes, side by side where the family can, and give each the outcome that `run_episode` gives it.
-
-    Raises:
-        RunError: As run_episode.
-    """
+    """Run episodes, side by side where the family can; each outcome, and what is raised, is as of `run_episode`."""
     together = run_together(family, episodes, needed) if len(episodes) > 1 else None
     return [run_episode(family, one, needed) for one in episodes] if together is None else together
 
@@ -103,10 +99,7 @@ def run_episode(family: DomainFamily, episode: Episode, needed: Collection[str] 
 def check_machine(whose: str, problem: BaseException | None, remedy: str) -> None:
     """Refuse to call something failed of what memory, disk or descriptors lacked, whoever caught that first.
 
-    The complaint begins with what was under way, and ends with how to run again.
-
-    Raises:
-        RunError: With what the machine lacked.
+    The RunError begins with what was under way, and ends with how to run again.
     """
     while problem is not None:
         if isinstance(problem, MemoryError) or getattr(problem, "errno", None) in OF_THE_MACHINE:

@@ -276,10 +276,7 @@ class Expected:
 def expect_of(space: Space, trials: Sequence[Trial], goal: Goal, seed: int = 0) -> Expected:
     """Expect what a target will tell: simulated trials are taken for one in turn, with a target's noise.
 
-    The goal's values count for nothing where they are known.
-
-    Raises:
-        RunError: If no trial has an outcome.
+    The goal's values count for nothing where they are known. A RunError if no trial has an outcome.
     """
     targets = tuple(as_targets(fit_outputs(space, trials), trials, goal, seed, EXPECTED_FROM))
     if not targets:
@@ -301,11 +298,7 @@ def _mean_information(several: Sequence[Information]) -> Information:
 
 
 def learn_theta(space: Space, trials: Sequence[Trial], goal: Goal, seed: int = 0) -> Knowledge:
-    """Learn what finished trials say of θ; same trials in any order, same knowledge.
-
-    Raises:
-        RunError: If no trial has an outcome, or no output changes.
-    """
+    """Learn what finished trials say of θ, in any order; a RunError if none has an outcome, or no output changes."""
     return Knowledge(fit_outputs(space, trials), goal, tuple(trials), seed)
 
 

@@ -71,10 +71,7 @@ SCORE_ENGINE = GAUSSIAN_PROCESS.name
 def engine_of(name: str, beside: Path | None = None) -> Engine:
     """The engine of this name, shipped, of a plug-in or `module:attribute`; every look-up goes through here.
 
-    Modules beside a study come before the installed ones.
-
-    Raises:
-        InputError: If there is no such engine, or it is none.
+    Modules beside a study come before the installed ones. An InputError if there is no such engine, or it is none.
     """
     shipped = {engine.name: engine for engine in ENGINES}
     if name not in shipped and ":" not in name and name not in plugins("engine", shipped):
@@ -116,10 +113,7 @@ def is_installed(engine: Engine) -> bool:
 def make_proposer(engine: str | Engine, initial: int, goal: Goal | None = None) -> Proposer:
     """The proposer of an engine, with so many trials from the quasi-random design first: all engines share it.
 
-    Without a goal a score has no parts.
-
-    Raises:
-        InputError: If there is no such engine, or it cannot be used.
+    Without a goal a score has no parts. An InputError if there is no such engine, or it cannot be used.
     """
     engine = engine_of(engine) if isinstance(engine, str) else engine
     reason = why_not_engine(engine, composed=goal is not None)

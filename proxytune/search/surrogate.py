@@ -95,11 +95,7 @@ class Surrogate:
 
 
 def fit_surrogate(space: Space, trials: Sequence[Trial]) -> Surrogate:
-    """Fit the surrogate to the trials that have a score: same trials in any order, same surrogate to the last bit.
-
-    Raises:
-        RunError: If no trial has a score.
-    """
+    """Fit the surrogate to the trials with a score, in any order to the same bit; a RunError if there are none."""
     from sklearn.exceptions import ConvergenceWarning
     from skopt.learning import GaussianProcessRegressor
 

@@ -96,11 +96,7 @@ class Store:
     @classmethod
     @contextmanager
     def read(cls, folder: Path) -> Iterator["Store"]:
-        """Open the study's database for reading, also while the study runs.
-
-        Raises:
-            InputError: If the study has not been run.
-        """
+        """Open the study's database for reading, also while the study runs; an InputError if it has not been run."""
         path = folder / FILE_NAME
         if not path.exists():
             raise InputError(f"{path}: no such file; run the study first: python -m proxytune study {folder}")

@@ -48,12 +48,7 @@ class Bank:
 
 
 def run_bank(run: StudyRun) -> None:
-    """Simulate what is left of a bank's design.
-
-    Raises:
-        SettingsError: If what the finished trials depend on has changed.
-        EpisodeError, RunError: As of any study.
-    """
+    """Simulate what is left of a bank's design; raises as any study, and if what it depends on has changed."""
     check_facts(run)
     run_preflight(run)
     settings, done = run.settings, len(run.finished_trials())
@@ -72,11 +67,7 @@ def run_bank(run: StudyRun) -> None:
 
 
 def bank_of(run: StudyRun) -> Bank:
-    """Sum up a bank; nothing is simulated.
-
-    Raises:
-        RunError: If it has no trial, or the store lacks episodes of one.
-    """
+    """Sum up a bank, simulating nothing; a RunError if it has no trial, or the store lacks episodes of one."""
     settings, goal, records = run.settings, goal_of(run), run.finished_trials()
     if not records:
         raise RunError(f"{run.store.path}: no trial is finished yet")

@@ -241,11 +241,7 @@ def _of_table(path: Path) -> Source:
 
 
 def write_table(run: StudyRun) -> Path:
-    """Write a study's trials as a table beside it, for other studies to learn from.
-
-    Raises:
-        StoreError: If it cannot be written.
-    """
+    """Write a study's trials as a table beside it, for other studies to learn from; else a StoreError."""
     source, path = _of_study(run.settings.home), run.settings.home / BANK_FILE
     metrics, agents = sorted(_metrics(run)), run.settings.agents
 

@@ -159,21 +159,13 @@ ESTIMATES = ("needed", "plv", "more")
 
 
 def save_lessons(settings: StudySettings, lessons: Mapping[str, Lesson]) -> None:
-    """Write what each family is worth as a teacher into the folder of all.
-
-    Raises:
-        StoreError: If it cannot be written.
-    """
+    """Write what each family is worth as a teacher into the folder of all; a StoreError if that cannot be."""
     text = json.dumps({name: asdict(one) for name, one in lessons.items()}, indent=2, allow_nan=False) + "\n"
     write_whole(_file(settings), text, kind=StoreError)
 
 
 def read_lessons(settings: StudySettings) -> dict[str, Lesson]:
-    """The lessons that were written; none where nothing was.
-
-    Raises:
-        StoreError: If the file is none that we wrote.
-    """
+    """The lessons that were written, none where nothing was; a StoreError if the file is none that we wrote."""
     path = _file(settings)
     try:
         return {name: _lesson(one) for name, one in json.loads(path.read_bytes()).items()}

@@ -57,11 +57,7 @@ def given_family(settings: StudySettings, family: Any) -> DomainFamily:
 
 
 def bare_family(settings: StudySettings, model: Path | None) -> DomainFamily:
-    """The family itself, without a guard, and with agents by the names that it loads.
-
-    Raises:
-        InputError: As load_family.
-    """
+    """The family itself, without a guard, and with agents by the names that it loads; raises as `load_family`."""
     if model is not None and not model.is_file():
         raise settings.error("proxy", f"no such file: {model}; check the path")
     if settings.family == GIVEN:
@@ -117,11 +113,7 @@ def _check(settings: StudySettings, family: DomainFamily) -> None:
 def check_bounds(
     settings: StudySettings, family: DomainFamily, key: str, name: str, bounds: tuple[float, float], given: str
 ) -> None:
-    """Refuse values of a parameter that the family has not, or that lie beyond what it can be.
-
-    Raises:
-        SettingsError: With the key, the values as they were given, and the remedy.
-    """
+    """Refuse values of a parameter that the family has not, or beyond what it can be: a SettingsError says which."""
     try:
         known = family.parameters.get(name)
     except ExtensionError as problem:

@@ -56,10 +56,7 @@ def _remedy(missing: Sequence[str], beyond: Sequence[str]) -> str:
 def read_target(settings: StudySettings, family: DomainFamily) -> tuple[ScoreTable, tuple[str, ...]]:
     """The target's scores of the study's agents, from the study's own starts where it has all of these.
 
-    What else it has of them is left out then, which a line says.
-
-    Raises:
-        InputError: If the table lacks a metric, or has a value that is not finite.
+    What else it has of them is left out then, which a line says. An InputError if a metric or a number is lacking.
     """
 
     def has_in_full(metric: str) -> bool:
@@ -137,11 +134,7 @@ def objective_of(settings: StudySettings) -> Objective:
 
 
 def measure_of(name: str, beside: Path | None = None) -> Measure:
-    """The measure that is not shipped: `module:attribute`, of this folder first, or the name of a plug-in.
-
-    Raises:
-        ExtensionError: If there is none.
-    """
+    """The measure that is not shipped: `module:attribute`, this folder's first, or a plug-in's; else ExtensionError."""
     measure = load(name, kind="measure", beside=beside)
     if not isinstance(measure, Measure):
         raise ExtensionError(f"measure '{name}' is a {type(measure).__name__}; make it a proxytune.Measure")
@@ -194,20 +187,12 @@ class Study:
 
 
 def open_study(path: Path) -> Study:
-    """Read a study.toml, load the family it names and the target's scores.
-
-    Raises:
-        InputError: If anything in it cannot be used, with file, key and remedy.
-    """
+    """Read a study.toml, load its family and the target's scores; an InputError tells file, key and remedy."""
     return open_settings(read_study_settings(path))
 
 
 def open_settings(settings: StudySettings, given: Any = None) -> Study:
-    """Load the family that a study.toml names, unless one is given, and the target's scores.
-
-    Raises:
-        InputError: As open_study, and if they are of several families.
-    """
+    """Load a study's family, unless one is given, and the target's scores; raises as `open_study`, and at several."""
     settings.check_single()
     family = load_family(settings, settings.proxy) if given is None else given_family(settings, given)
     known, left_out = with_scores(settings)
@@ -219,11 +204,7 @@ def open_settings(settings: StudySettings, given: Any = None) -> Study:
 
 
 def open_bank(settings: StudySettings) -> Study:
-    """Load the family of a bank, a study without a target; its table of scores has zeros for those of a target.
-
-    Raises:
-        InputError: If anything in it cannot be used.
-    """
+    """Load the family of a bank, a study without a target, whose table of scores has zeros; raises as `open_study`."""
     family = load_family(settings, settings.proxy)
     names = dict.fromkeys((*(metric.name for metric in settings.metrics), *family.metrics))
     cells = itertools.product(settings.agents, range(settings.starts))

@@ -191,11 +191,8 @@ class Preflight:
 def run_preflight(run: StudyRun) -> Preflight | None:
     """The pre-flight of a study that has no finished trial yet; what is missing of it is simulated now.
 
-    Nothing of it enters a trial. A study whose trials have begun goes on without: None.
-
-    Raises:
-        EpisodeError: If an episode fails and the study is to stop then.
-        RunError: If every episode fails alike.
+    Nothing of it enters a trial. A study whose trials have begun goes on without: None. An EpisodeError if an episode
+    fails and the study is to stop then, a RunError if every episode fails alike.
     """
     if run.finished_trials():
         return None

@@ -136,11 +136,7 @@ class StudyResult:
 
 
 def result_of(run: StudyRun, scored_anew: Sequence[TrialRecord] | None = None) -> StudyResult:
-    """Sum up what the store has, or the same trials scored anew; nothing is simulated.
-
-    Raises:
-        RunError: If no trial has a score.
-    """
+    """Sum up what the store has, or the same trials scored anew; a RunError if no trial has a score."""
     trials = tuple(run.finished_trials() if scored_anew is None else scored_anew)
     earlier = earlier_trials(run)
     if not any(trial.state == "finished" for trial in trials) and (run.settings.budget or not earlier):
@@ -223,11 +219,7 @@ def _failures(run: StudyRun, trials: tuple[TrialRecord, ...]) -> tuple[str, ...]
 
 
 def with_metrics(study: Study, metrics: Sequence[Metric]) -> Study:
-    """The study with its agents compared by these metrics instead.
-
-    Raises:
-        InputError: If the domain family or the target's table lacks one, or one is named twice.
-    """
+    """The study with its agents compared by these metrics; an InputError if one is lacking, or named twice."""
     names = [metric.name for metric in metrics]
     for name in names:
         if name not in study.family.metrics:
@@ -241,9 +233,7 @@ def with_metrics(study: Study, metrics: Sequence[Metric]) -> Study:
 def rescored(run: StudyRun, metrics: Sequence[Metric]) -> StudyResult:
     """The result that the study's trials give by these metrics; they remain those that its own metrics led to.
 
-    Raises:
-        InputError: If a metric cannot be used.
-        RunError: If no trial has a score, or episodes are missing.
+    An InputError if a metric cannot be used, a RunError if no trial has a score, or episodes are missing.
     """
     own, other = run.finished_trials(), run.of(with_metrics(run.study, metrics))
     trials = [

@@ -122,9 +122,7 @@ def _estimate(summary: Floats) -> Estimate:
 def learn_fleet(path: Path, targets: Sequence[Path]) -> Fleet:
     """Learn θ of each robot and p(θ) over them, from the trials of a study or bank.
 
-    Raises:
-        InputError: If the study knows no trial, or a table cannot be used.
-        RunError: If no trial has an outcome.
+    An InputError if the study knows no trial or a table cannot be used, a RunError if no trial has an outcome.
     """
     settings = read_study_settings(path)
     settings.check_single()

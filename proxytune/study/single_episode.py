@@ -54,11 +54,7 @@ class RecordedEpisode:
 
 
 def check_episode(family: DomainFamily, agent: str, theta: Theta, start: int) -> None:
-    """Refuse what the family does not have.
-
-    Raises:
-        InputError: With what it has.
-    """
+    """Refuse what the family does not have: an InputError tells what it has."""
     family.check_agent(agent)
     if not 0 <= start < family.starts:
         raise InputError(f"start {start}: the family has {family.starts}; give 0 to {family.starts - 1}")
@@ -157,22 +153,14 @@ class SideBySide:
 def drive_side_by_side(
     proxy: DomainFamily, target: DomainFamily | None, episode: Episode, *, filmed: bool = False
 ) -> SideBySide:
-    """Run an episode in the proxy at its θ, and in the target as that is.
-
-    Raises:
-        EpisodeError: If agent or domain fail in either.
-    """
+    """Run an episode in the proxy at its θ, and in the target as that is; an EpisodeError if either fails."""
     unit, road = getattr(proxy, "command_unit", ""), getattr(proxy, "road_to_draw", None)
     there = None if target is None else record_episode(target, replace(episode, theta=()), filmed=filmed)
     return SideBySide(episode, proxy.metrics, unit, road, record_episode(proxy, episode, filmed=filmed), there)
 
 
 def check_robot(family: DomainFamily, model: Path, option: str) -> None:
-    """Refuse a model of another robot than the family's.
-
-    Raises:
-        InputError: If there is no such model, or it is of another robot.
-    """
+    """Refuse a model that is not there, or of another robot than the family's, by an InputError."""
     if not model.is_file():
         raise InputError(f"{option} {model}: no such file; check the path")
     robot = getattr(family, "robot", None)

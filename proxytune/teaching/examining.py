@@ -27,10 +27,8 @@ TRACES = ".under_way"
 def prepare_points(setup: TeachingSetup, points: Sequence[CurvePoint], jobs: int) -> None:
     """Make what these points share with others.
 
-    Raises:
-        LearnerError: If an expert cannot drive, or the learner cannot use the samples.
-        EpisodeError: If a domain or the learner fails, or takes longer than it may.
-        RunError: If a process or the machine fails.
+    A LearnerError if an expert cannot drive or samples cannot be used, an EpisodeError if a domain or the learner fails
+    or takes too long, a RunError if a process or the machine fails.
     """
     with _spread(setup, setup.prepare, points, jobs) as made:
         for _ in made:

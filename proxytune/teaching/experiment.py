@@ -68,11 +68,7 @@ class Experiment:
 
 
 def load_setup(settings: study.StudySettings) -> TeachingSetup:
-    """Load both domain families and the learner that a study's [teaching] table names.
-
-    Raises:
-        InputError: If any of it cannot be used, with file, key and remedy.
-    """
+    """Load the families and the learner that a study's [teaching] names; an InputError tells file, key and remedy."""
     taught = teaching_settings(settings)
     try:
         found = load(taught.learner, kind="learner", beside=settings.folder, needs=("train", "act"), call=True)
@@ -93,11 +89,7 @@ def load_setup(settings: study.StudySettings) -> TeachingSetup:
 
 
 def teaching_settings(settings: study.StudySettings) -> learning.TeachingSettings:
-    """The [teaching] table of a study.
-
-    Raises:
-        SettingsError: If it has none.
-    """
+    """The [teaching] table of a study; a SettingsError if it has none."""
     if settings.teaching is None:
         raise settings.error("teaching", "is missing; add the table, as in studies/teacher/study.toml")
     return settings.teaching
@@ -139,11 +131,7 @@ def _teacher(
 
 
 def check_proxies(settings: study.StudySettings, setup: TeachingSetup) -> None:
-    """Refuse a study without proxies, a parameter that the family has not, or a value beyond its bounds.
-
-    Raises:
-        SettingsError: With the proxy and the parameter.
-    """
+    """Refuse by a SettingsError a study without proxies, an unknown parameter, or a value beyond its bounds."""
     if not setup.settings.proxies:
         raise settings.error("teaching.proxies", "is missing; name at least one, as in [teaching.proxies.nominal]")
     for proxy, where in setup.settings.proxies.items():
@@ -164,11 +152,7 @@ def classroom(settings: study.StudySettings, model: Path | None, lessons: str) -
 
 
 def classrooms(settings: study.StudySettings) -> dict[str, Classroom]:
-    """Every family of a study as one that can teach; none where the study has no [teaching].
-
-    Raises:
-        SettingsError: If one cannot, with its name.
-    """
+    """Every family of a study as one that can teach, else a SettingsError; none where it has no [teaching]."""
     if settings.teaching is None:
         return {}
     load_setup(settings)

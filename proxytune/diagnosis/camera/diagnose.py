@@ -171,9 +171,7 @@ def diagnose_camera(
 ) -> error.CameraDiagnosis:
     """Tune what is declared of a camera, find what is missing, and test both on frames kept aside, as `diagnose_log`.
 
-    Raises:
-        LogError: If the frames cannot bear the question: too few markings, or other poses than these.
-        SettingsError: If the robot has no camera.
+    A LogError if frames show too few markings, or other poses than these; a SettingsError if the robot has no camera.
     """
     if log.frames is None:
         raise LogError(f"{log.name}: has no frames; add [camera] to log.toml")

@@ -30,11 +30,7 @@ MOST_TRIED = 8
 
 
 def write_diagnosis(found: LogDiagnosis, folder: Path, command: str = "") -> list[Path]:
-    """Write diagnosis.json, model.toml, next/commands.csv with a ROS 2 node that plays it, figures and page; paths.
-
-    Raises:
-        RunError: If a file cannot be written.
-    """
+    """Write diagnosis.json, model.toml, next/commands.csv with a ROS 2 node that plays it, figures and page; paths."""
     whole, model, page = (folder / name for name in ("diagnosis.json", "model.toml", "report.html"))
     text = json.dumps(document.diagnosis_document(found), indent=2, allow_nan=False, ensure_ascii=False)
     write_text(whole, text)

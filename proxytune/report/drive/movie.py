@@ -154,11 +154,7 @@ NO_PLACES = "nothing can be drawn, as this study's domain family records no x an
 
 
 def check_episode_file(path: Path) -> None:
-    """Refuse a file that cannot be written, before anything is simulated for it.
-
-    Raises:
-        InputError: If its format is unknown, its writer is missing, or its folder cannot be written to.
-    """
+    """Refuse a file of unknown format, without its writer or in no folder for it, before anything is simulated."""
     if path.suffix.lower() not in (STILL, GIF, MP4):
         raise InputError(f"--output {path}: unknown format '{path.suffix}'; end the name in {STILL}, {GIF} or {MP4}")
     check_place(path)
@@ -169,9 +165,7 @@ def check_episode_file(path: Path) -> None:
 def write_episode(pair: SideBySide, metrics: Sequence[str], path: Path) -> None:
     """Write a still picture with these metrics, or an animation whose frames are counted, as the path's ending says.
 
-    Raises:
-        InputError: If it is not known where the robots were.
-        RunError: If it cannot be written.
+    An InputError if it is not known where the robots were, a RunError if it cannot be written.
     """
     if not all(episode.has_places for episode in pair.sides.values()):
         raise InputError(f"--output {path}: {NO_PLACES}; leave the option out to see its metrics")

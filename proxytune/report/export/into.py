@@ -62,10 +62,8 @@ class Patched:
 def patch(instance: Instance, path: Path, output: Path, wheels: Sequence[str] = ()) -> Patched:
     """A user's own file (.urdf, .sdf, or .xml of MuJoCo) with what was found; the diff calls it as the output.
 
-    The joints of the left and the right wheel are found where they are not given.
-
-    Raises:
-        InputError: If its wheels cannot be told, or something in it is beyond what is understood here.
+    The joints of both wheels are found where they are not given. An InputError if they cannot be told, or something is
+    beyond what is understood here.
     """
     if path.suffix == ".xacro":
         made = f"{path.name.removesuffix('.xacro').removesuffix('.urdf')}.urdf"

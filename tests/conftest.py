@@ -205,6 +205,14 @@ def launcher() -> Iterator[object]:
 
 
 @pytest.fixture(scope="session")
+def rolled_frames(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A log of 30 frames standing still, of a camera that is tilted by 4° to one side."""
+    pictured = import_module("pictured")
+    folder = tmp_path_factory.mktemp("rolled") / "log"
+    return Path(pictured.write_still_frames(folder, pictured.ROLLED, pictured.lane_poses(30), columns=96))
+
+
+@pytest.fixture(scope="session")
 def finished_once(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A finished study, run once."""
     from searched import changed, searched

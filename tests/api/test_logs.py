@@ -13,7 +13,6 @@ import pandas as pd
 import pytest
 from matplotlib.figure import Figure
 from one_line import complaint_of
-from pictured import lane_poses, write_still_frames
 from planted import CALM, TRUTH, planted_log, write_log
 
 from proxytune.api import log_of
@@ -77,15 +76,9 @@ def test_a_robot_that_nobody_knows_is_asked_for_by_its_argument_and_what_is_no_f
     assert "no such folder; check the path" in complaint_of(diagnose, str(tmp_path / "nowhere"))
 
 
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    theta = {"camera_pitch": 19.15, "camera_roll": 4.0}
-    return write_still_frames(tmp_path_factory.mktemp("rolled") / "log", theta, lane_poses(30), columns=96)
-
-
 @pytest.mark.slow
-def test_the_camera_speaks_where_there_is_no_motion(folder, tmp_path):
-    report = diagnose(read_log(folder))
+def test_the_camera_speaks_where_there_is_no_motion(rolled_frames, tmp_path):
+    report = diagnose(read_log(rolled_frames))
     assert (report.verdict, report.effects, report.diagnosis) == ("explained", ("camera_roll",), None)
     assert report.camera.verdict == "explained"
     assert repr(report).startswith("DiagnosisReport of pictured: camera: camera roll: the camera is tilted by 4.")
@@ -104,11 +97,11 @@ def test_the_camera_speaks_where_there_is_no_motion(folder, tmp_path):
     assert any("camera_roll" in note for note in report.notes)
 
 
-def test_errors_are_in_python_s_words(folder):
-    told = complaint_of(diagnose, folder, declared=["camera_rol"])
+def test_errors_are_in_python_s_words(rolled_frames):
+    told = complaint_of(diagnose, rolled_frames, declared=["camera_rol"])
     assert re.match("declared: camera_rol: .*did you mean 'camera_roll'", told)
     assert "--" not in told
-    assert complaint_of(diagnose, folder, test=folder).startswith("test: pictured has no commands")
+    assert complaint_of(diagnose, rolled_frames, test=rolled_frames).startswith("test: pictured has no commands")
 
 
 DESCRIPTION = {"robot": "duckiebot", "command": "duty", "rate_hz": 20}

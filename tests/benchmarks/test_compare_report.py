@@ -1,6 +1,5 @@
 """The comparison of engines as figure, tables, JSON and page."""
 
-import io
 from dataclasses import replace
 from io import BytesIO
 
@@ -12,7 +11,7 @@ from compare_report import compare_document, compare_figure, compare_lines, comp
 from compared_engines import ENGINES, NAMES
 from judgement import Judgement, Reading
 from PIL import Image
-from rich.console import Console
+from readable import on_terminal
 from runs import Estimate, Run, RunKey, summarise
 
 from proxytune.report import foot_of, table_text
@@ -76,11 +75,8 @@ def test_a_look_that_cannot_be_drawn_is_one_of_the_palette(wish, monkeypatch):
 def test_the_tables_tell_how_good_how_soon_and_what_is_known():
     reading = Reading(0.02, True, {"delay": True, "trim": False}, 0.4, True)
     engines = [runs("outcomes", [9.0, 4.0], [8.0, 0.0], reading=reading), runs("gp", [9.0, 8.0], [8.0, 7.0])]
-    text = io.StringIO()
-    console = Console(file=text, width=160)
-    for table in compare_tables("truths", [summarise(group, engines[0], 1.0, 960.0) for group in engines], 2):
-        console.print(table_text(table))
-    told = text.getvalue()
+    tables = compare_tables("truths", [summarise(group, engines[0], 1.0, 960.0) for group in engines], 2)
+    told = on_terminal(*map(table_text, tables))
     for expected in (
         "7.0 (5.0 to 9.0)",
         "5.5 (4.0 to 7.0)",

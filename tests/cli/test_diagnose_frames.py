@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from pictured import add_frames, lane_poses, write_still_frames
+from pictured import ROLLED, add_frames
 from planted import CALM, RATE_HZ, TRUTH, driven_log, write_log
 
 from proxytune.cli.diagnose import shares as shares_of
@@ -17,7 +17,6 @@ from proxytune.effects import read_model
 from proxytune.logs import read_log
 
 pytestmark = pytest.mark.usefixtures("few_effects")
-ROLLED = {"camera_pitch": 19.15, "camera_roll": 4.0}
 KEYS = {
     *("verdict", "declared", "effects", "immaterial", "candidates", "error", "grey_error", "fixed_to_camera"),
     *("blemishes", "could_not_be_seen", "next_views", "map", "matched_share", "frames", "pose_scatter"),
@@ -34,16 +33,11 @@ class Found(NamedTuple):
 
 
 @pytest.fixture(scope="module")
-def stills(tmp_path_factory):
-    return write_still_frames(tmp_path_factory.mktemp("stills") / "log", ROLLED, lane_poses(30), columns=96)
-
-
-@pytest.fixture(scope="module")
-def found(stills, tmp_path_factory):
+def found(rolled_frames, tmp_path_factory):
     """The folder and the document of a diagnosis of still frames, what people read, and the steps."""
     folder, out, err = tmp_path_factory.mktemp("found") / "out", io.StringIO(), io.StringIO()
     with redirect_stdout(out), redirect_stderr(err):
-        assert main(["diagnose", str(stills), "--output", str(folder)]) == 0
+        assert main(["diagnose", str(rolled_frames), "--output", str(folder)]) == 0
     return Found(folder, json.loads((folder / "diagnosis.json").read_text()), out.getvalue(), err.getvalue())
 
 
@@ -108,12 +102,12 @@ def test_model_toml_and_figures_are_the_camera_s_and_people_read_its_verdict_rol
     assert "fitting the camera" in found.err
 
 
-def test_an_unknown_effect_and_a_log_to_test_on_are_refused_in_one_line(stills, tmp_path, refused):
-    line = refused("diagnose", stills, "--declared", "camera_rol", "--output", tmp_path / "out")
+def test_an_unknown_effect_and_a_log_to_test_on_are_refused_in_one_line(rolled_frames, tmp_path, refused):
+    line = refused("diagnose", rolled_frames, "--declared", "camera_rol", "--output", tmp_path / "out")
     assert "--declared camera_rol: no effect on motion, camera or pictures has this name; did you mean" in line
     assert "'camera_roll'" in line
     assert not (tmp_path / "out").exists()
-    line = refused("diagnose", stills, "--test", stills, "--output", tmp_path / "out")
+    line = refused("diagnose", rolled_frames, "--test", rolled_frames, "--output", tmp_path / "out")
     assert "--test: pictured has no commands" in line
 
 

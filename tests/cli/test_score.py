@@ -8,7 +8,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 from one_line import complaint_of
-from rich.console import Console
+from readable import on_terminal
 
 from proxytune.cli import score
 from proxytune.cli.commands import add_options
@@ -43,10 +43,7 @@ def document(*words):
 
 
 def shown(*words):
-    console = Console(width=160, record=True, file=None, quiet=False)
-    with console.capture() as captured:
-        console.print(run(*words).text)
-    return captured.get()
+    return on_terminal(run(*words).text)
 
 
 METRIC = ("--metric", "distance:max", "--metric", "time:min")

@@ -1,9 +1,7 @@
 """Tables are readable at 80 columns and at 44: names and figures may be broken, but never cut."""
 
-import io
-
 import pytest
-from rich.console import Console
+from readable import on_terminal
 
 from proxytune.cli.main import COMMANDS, parser
 from proxytune.report import Table, columns_of, table_text
@@ -19,9 +17,7 @@ SCORES = "domain,agent,episode,distance,lane_error_of_the_whole_drive\n" + "".jo
 
 def marks(text, width):
     """What is shown at a width, without what lays it out."""
-    console = Console(width=width, file=io.StringIO(), color_system=None)
-    console.print(text, crop=False)
-    return sorted("".join(console.file.getvalue().split()))
+    return sorted("".join(on_terminal(text, width=width).split()))
 
 
 def assert_whole(text):

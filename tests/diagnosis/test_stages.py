@@ -12,9 +12,10 @@ from pathlib import Path
 import hidden_cases as hidden
 import numpy as np
 import pytest
-from pictured import ROBOT, lane_poses, write_still_frames
+from pictured import ROBOT, ROLLED, lane_poses, write_still_frames
 from PIL import Image
 from planted import CALM, TRUTH, look_for_few, planted_log
+from stopping import Killed
 from threadpoolctl import threadpool_info, threadpool_limits
 
 from proxytune.diagnosis import RULES, diagnose_log, forget_stages, robot_of
@@ -25,10 +26,6 @@ from proxytune.errors import RunError
 from proxytune.files import shipped
 from proxytune.logs import Frames, read_log
 from proxytune.report import diagnosis_document
-
-
-class Killed(BaseException):
-    """As a signal that nothing can catch."""
 
 
 def test_nothing_is_removed_behind_a_link_in_the_place_of_the_stages(tmp_path):
@@ -156,7 +153,7 @@ OF_CAMERA = ["everything", "match", "named", "weighed", "look", "concluded"]
 
 def still_frames(folder):
     """The folder of a log of few and small frames by a camera that is rolled."""
-    return write_still_frames(folder, {"camera_pitch": 19.15, "camera_roll": 4.0}, lane_poses(20), columns=64)
+    return write_still_frames(folder, ROLLED, lane_poses(20), columns=64)
 
 
 def assert_same_to_the_bit(one, other):

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from nominal_camera import Dark
 from one_line import complaint_of
 
 from proxytune.domain import Classroom, DomainFamily, OnPolicyClassroom, make_episode
@@ -32,13 +33,6 @@ NOMINAL = ()
 SHIFTED = (("trim", 0.06), ("delay", 0.19))
 STEPS = np.array([(1.6, 0.6 + 0.004 * step, np.pi / 2 + 0.02 * np.sin(step / 9.0)) for step in range(80)])
 """Poses that are shown to the expert one after the other, whatever it does."""
-
-
-class Dark:
-    """A camera that costs nothing: the expert does not look."""
-
-    def render(self, poses):
-        return np.zeros((len(poses), 1, 1, 3), dtype=np.uint8)
 
 
 def expert(seed=0, *, look_ahead=LOOK_AHEAD, disturbance=0.0, gain=GAIN):

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
+from nominal_camera import Dark
 from one_line import complaint_of
 
 from proxytune.domain import make_episode
@@ -288,13 +289,6 @@ def test_ten_starts_lie_in_their_lanes_some_in_either(road):
     assert (np.abs(pose.deviation) < road.lane_width / 2).all()
     assert (np.abs(pose.heading_error) < pi / 4).all()
     assert set(pose.counter_clockwise) == {True, False}
-
-
-class Dark:
-    """A camera that costs nothing: the expert does not look."""
-
-    def render(self, poses):
-        return np.zeros((len(poses), 1, 1, 3), dtype=np.uint8)
 
 
 @pytest.mark.slow

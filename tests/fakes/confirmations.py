@@ -20,8 +20,9 @@ TOLD = (
 
 
 def normal(centre, deviation, correlation=0.0):
-    """A log density over the unit cube of delay and trim."""
-    covariance = np.outer(deviation, deviation) * np.array([[1.0, correlation], [correlation, 1.0]])
+    """A log density over the unit cube, of a normal whose first two coordinates are correlated."""
+    covariance = np.diag(np.square(deviation))
+    covariance[0, 1] = covariance[1, 0] = correlation * deviation[0] * deviation[1]
     inverse = np.linalg.inv(covariance)
     return lambda points: -0.5 * np.einsum("ni,ij,nj->n", points - centre, inverse, points - centre)
 

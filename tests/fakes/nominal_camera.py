@@ -1,4 +1,4 @@
-"""The Duckiebot's camera as its makers state it, and where it looks from on the small loop."""
+"""The Duckiebot's camera as its makers state it, where it looks from on the small loop, and one that sees nothing."""
 
 import numpy as np
 
@@ -15,6 +15,13 @@ CAMERA = CameraFigures(
     field_of_view_deg=75.0,
     k1=0.0,
 )
+
+
+class Dark:
+    """A camera that costs nothing: the expert does not look."""
+
+    def render(self, poses):
+        return np.zeros((len(poses), 1, 1, 3), dtype=np.uint8)
 
 
 def loop_poses(count):

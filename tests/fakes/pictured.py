@@ -27,6 +27,7 @@ ROAD = shipped_map("small_loop")
 ROBOT = read_robot("duckiebot")
 LAP_M = 4.0
 PICTURES = "frames/%06d.png"
+ROLLED = {"camera_pitch": 19.15, "camera_roll": 4.0}
 
 
 def pictures(theta: Mapping[str, float], poses: Array, columns: int = 160) -> NDArray[np.uint8]:

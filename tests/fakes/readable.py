@@ -1,7 +1,10 @@
-"""Figures as the column of a paper takes them."""
+"""Figures as the column of a paper takes them, and texts as a terminal shows them."""
+
+import io
 
 import pytest
 from matplotlib.text import Text
+from rich.console import Console
 
 
 def assert_readable(*figures, points=6.0):
@@ -15,3 +18,10 @@ def assert_readable(*figures, points=6.0):
         legends = [legend.get_window_extent() for legend in figure.legends]
         assert all(figure.bbox.x0 - 1 <= box.x0 <= box.x1 <= figure.bbox.x1 + 1 for box in (*boxes, *legends))
         assert not any(legend.overlaps(box) for legend in legends for box in boxes)
+
+
+def on_terminal(*texts, width=160):
+    """What a terminal so wide shows."""
+    console = Console(width=width, file=io.StringIO(), color_system=None)
+    console.print(*texts, crop=False)
+    return console.file.getvalue()

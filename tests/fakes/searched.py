@@ -32,6 +32,12 @@ def looked_at(study):
         return result_of(StudyRun(study, store))
 
 
+def run(folder):
+    """What came of the study in a folder, whose trials are run now."""
+    searched(open_study(folder))
+    return looked_at(open_study(folder))
+
+
 @contextmanager
 def running(study):
     """The run of a study, or of the study in a folder."""

@@ -1,6 +1,10 @@
-"""A watcher that interrupts."""
+"""A watcher that interrupts, and what nothing catches."""
 
 from proxytune.running import Silent
+
+
+class Killed(BaseException):
+    """As a signal that nothing can catch."""
 
 
 class Stopping(Silent):

@@ -6,6 +6,9 @@ from schoolroom import Matrix, Schoolroom
 from wobbly import Wobbly
 
 from proxytune.learning import Cache, Distribution, TeachingSettings
+from proxytune.running import Silent
+from proxytune.study import read_study_settings
+from proxytune.teaching import load_setup, run_experiment
 from proxytune.teaching.points import TeachingSetup
 
 TEACHING = """
@@ -37,6 +40,12 @@ def make_taught(make_study, *, grid=GRID, more="", **changes):
     path = folder / "study.toml"
     path.write_text(path.read_text() + TEACHING.format(grid=grid, more=more))
     return folder
+
+
+def run(folder, watcher=None):
+    """The learning experiment of a study's folder, run to its end."""
+    settings = read_study_settings(folder)
+    return run_experiment(settings, load_setup(settings), watcher or Silent())
 
 
 PROXY = Distribution({"trim": (0.1, 0.2)})

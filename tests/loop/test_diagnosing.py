@@ -4,6 +4,7 @@ from contextlib import nullcontext
 
 import pytest
 from planted import TRUTH, planted_log
+from stopping import Killed
 from tiny_loop import FOUND, write_diagnosis, write_tiny
 
 from proxytune.diagnosis.stages import Stages
@@ -49,10 +50,6 @@ def test_what_a_study_may_read_lies_beside_the_extended_one_and_what_runs_made_d
     extended(tmp_path)
     there = {path.relative_to(folder / "loop" / "extended").as_posix() for path in (folder / "loop").rglob("*.*")}
     assert there == {"study.toml", "twin.toml", "found.toml", "mine.py", "robby/robot.toml"}
-
-
-class Killed(BaseException):
-    """As a signal that nothing can catch."""
 
 
 class Quiet:

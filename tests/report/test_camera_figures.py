@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from pictured import ROBOT, lane_poses, write_still_frames
+from pictured import ROBOT
 from readable import assert_readable
 
 from proxytune.diagnosis import Blemish, CameraEffect, Estimate, LaidLine, LaidMap
@@ -29,10 +29,8 @@ AFTER = "with camera roll"
 
 
 @pytest.fixture(scope="module")
-def diagnosis(tmp_path_factory):
-    theta = {"camera_pitch": 19.15, "camera_roll": 4.0}
-    folder = write_still_frames(tmp_path_factory.mktemp("rolled") / "log", theta, lane_poses(30), columns=96)
-    found = diagnose_camera(read_log(folder), ROBOT, ("camera_pitch", "blur"))
+def diagnosis(rolled_frames):
+    found = diagnose_camera(read_log(rolled_frames), ROBOT, ("camera_pitch", "blur"))
     assert [effect.effect for effect in found.effects] == ["camera_roll"]
     return found
 

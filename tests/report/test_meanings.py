@@ -1,10 +1,9 @@
 """Every effect and parameter is told in a plain clause, and a finding in a sentence with its size and worth."""
 
-import io
 import re
 
 import pytest
-from rich.console import Console
+from readable import on_terminal
 
 from proxytune.cli.main import main
 from proxytune.diagnosis import Estimate
@@ -102,8 +101,6 @@ def test_all_of_one_is_told(words, said, capsys):
 def test_no_word_of_a_table_is_broken_however_narrow_the_terminal(width):
     topic = "/front/camera/image_raw/compressed"
     rows = ((topic, "sensor_msgs/msg/CompressedImage", "812", "frames, every second one of them"),) * 2
-    console = Console(width=width, file=io.StringIO(), color_system=None)
-    console.print(table_text(Table("", columns_of(("what", "type", "count", "for")), rows)), crop=False)
-    told = console.file.getvalue()
+    told = on_terminal(table_text(Table("", columns_of(("what", "type", "count", "for")), rows)), width=width)
     assert {topic, "sensor_msgs/msg/CompressedImage", "every"} <= set(told.split())
     assert max(map(len, told.splitlines())) <= max(width, len(topic) + 31 + 5 + 7 + 6)

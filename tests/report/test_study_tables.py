@@ -1,13 +1,12 @@
 """Document and tables of a study."""
 
-import io
 import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from confirmations import LACKS, TOLD, UNTOLD, confirmed, planted
-from rich.console import Console
+from readable import on_terminal
 from searched import looked_at, searched
 
 from proxytune.report import study_document, study_sentence, study_text
@@ -82,9 +81,7 @@ def test_the_document_has_the_promised_keys_what_is_known_of_theta_floor_and_pai
 
 
 def shown(result):
-    console = Console(width=300, file=io.StringIO())
-    console.print(study_text(result, "none run", {"figure": "convergence.png"}))
-    return console.file.getvalue()
+    return on_terminal(study_text(result, "none run", {"figure": "convergence.png"}), width=300)
 
 
 def test_the_first_line_is_the_sentence_that_json_has_too_then_tables_with_names_and_values_as_they_are(result):

@@ -9,8 +9,7 @@ from io import BytesIO
 import numpy as np
 import pytest
 from PIL import Image
-from readable import assert_readable
-from rich.console import Console
+from readable import assert_readable, on_terminal
 
 from proxytune.report import sweep
 from proxytune.report.text import table_text
@@ -76,10 +75,7 @@ def test_the_name_is_short_and_has_one_mark_of_held_values_in_any_order(swept):
 
 
 def test_people_see_a_row_per_value(swept):
-    console = Console(width=80)
-    with console.capture() as captured:
-        console.print(*map(table_text, sweep.curve_tables(swept)))
-    shown = captured.get()
+    shown = on_terminal(*map(table_text, sweep.curve_tables(swept)), width=80)
     rows = [line for line in shown.splitlines() if line.strip().startswith("0.1 ")]
     assert len(rows) == 2, "one row in each of the two tables"
     assert "…" not in shown, "all fits eighty columns"

@@ -1,6 +1,6 @@
 """Tables on the terminal: numbers end together, names are no markup, notes and files are lines."""
 
-from rich.console import Console
+from readable import on_terminal
 
 from proxytune.report.text import file_texts, group_texts, section_text, table_text
 from proxytune.report.view import Column, Table, columns_of
@@ -9,10 +9,7 @@ TABLE = Table("A [b]x[/b]", columns_of(("agent",), ("s per\nepisode",)), (("  [b
 
 
 def printed(*parts):
-    console = Console(width=60, no_color=True)
-    with console.capture() as capture:
-        console.print(group_texts(*parts))
-    return [line.rstrip() for line in capture.get().splitlines()]
+    return [line.rstrip() for line in on_terminal(group_texts(*parts), width=60).splitlines()]
 
 
 def test_numbers_end_together_below_the_title_begin_together_in_a_section_and_nothing_is_markup():

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from confirmations import normal
 from hypothesis import given, settings, strategies as st
 from scipy.stats import chi2
 from steps import SPACE, goal, whole
@@ -137,14 +138,6 @@ def test_the_dispersion_is_one_unless_a_misfit_is_said(misfit, dispersion):
 def test_with_too_few_trials_nothing_is_said(count):
     found = learn_theta(SPACE, trials_of_misfit(1, count), goal(whole, outputs((0.1, 0.1), 5))).misfit
     assert (found.p_value, found.fits) == (None, None)
-
-
-def normal(centre, widths, correlation=0.0):
-    """Log density of a normal with these standard deviations."""
-    matrix = np.diag(np.square(widths))
-    matrix[0, 1] = matrix[1, 0] = correlation * widths[0] * widths[1]
-    inverse = np.linalg.inv(matrix)
-    return lambda points: -0.5 * np.einsum("ij,jk,ik->i", points - centre, inverse, points - centre)
 
 
 @settings(max_examples=15)

@@ -8,7 +8,7 @@ import re
 import numpy as np
 import pytest
 from one_line import complaint_of
-from searched import looked_at, searched
+from searched import run
 
 from proxytune.errors import InputError
 from proxytune.report.study.page import usefulness_table
@@ -27,11 +27,6 @@ def nearness(proxy, target, metrics):
 NEARNESS = Measure(key="nearness", name="nearness", title="largest error of a mean, less than 0", better="higher",
                    meaning="up to 0", digits=".3g", on_means=nearness)
 """
-
-
-def run(folder):
-    searched(open_study(folder))
-    return looked_at(open_study(folder))
 
 
 @pytest.fixture

@@ -9,7 +9,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from searched import changed, looked_at, searched
+from searched import changed, looked_at, run, searched
 from stopping import Stopping
 
 from proxytune.domain import Outcome
@@ -325,11 +325,6 @@ def test_every_trial_has_its_state_its_value_where_it_was_measured_and_the_objec
         {"trial": 3, "failed_episodes": 3, "failure": "agent0 failed"},
     ]
     assert history_of(result(make_study(), maximise=True)).maximise
-
-
-def run(folder):
-    searched(open_study(folder))
-    return looked_at(open_study(folder))
 
 
 def test_the_best_theta_is_visited_and_not_the_luckiest(finished):

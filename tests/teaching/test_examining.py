@@ -2,23 +2,19 @@
 
 import numpy as np
 import pytest
-from taught import GRID, make_taught
+from stopping import Killed
+from taught import GRID, make_taught, run
 from telling import Telling
 
 from proxytune.errors import SettingsError
 from proxytune.learning import NONE, Examination, curves_of
 from proxytune.running import Silent
 from proxytune.study import read_study_settings
-from proxytune.teaching import count_examinations, load_setup, run_experiment
+from proxytune.teaching import count_examinations, load_setup
 from proxytune.teaching.examining import examine_curves
 
 CURVES = 4
 CHOSEN = "examinations = 14"
-
-
-def run(folder, watcher=None):
-    settings = read_study_settings(folder)
-    return run_experiment(settings, load_setup(settings), watcher or Silent())
 
 
 def scores(experiment):
@@ -35,10 +31,6 @@ def test_as_many_examinations_are_made_as_the_study_allows_and_counts_need_not_l
     assert sum(len(curve.examined) for curve in found.needs.curves.values()) == 14 * CURVES
     assert any(set(each) - set(GRID) for each in counts(found).values())
     assert all(set(GRID) <= set(each) for each in counts(found).values())
-
-
-class Killed(BaseException):
-    """What stops a run without asking."""
 
 
 class Killer(Telling):

@@ -13,7 +13,7 @@ from types import MappingProxyType, SimpleNamespace
 import numpy as np
 import pytest
 from several import make_several
-from taught import GRID, TEACHING, make_taught
+from taught import GRID, TEACHING, make_taught, run
 from telling import Telling
 
 from proxytune.errors import EpisodeError, LearnerError, SettingsError
@@ -53,11 +53,6 @@ def test_orders_are_compared_pair_by_pair_unless_tied_or_open():
     unreached = SURE.copy()
     unreached[:, 2] = -np.inf
     assert agreement(NAMES, SURE, unreached).reversed == (("low", "high"), ("middle", "high"))
-
-
-def run(folder):
-    settings = read_study_settings(folder)
-    return run_experiment(settings, load_setup(settings), Silent())
 
 
 def figures(found):

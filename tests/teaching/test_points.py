@@ -13,16 +13,15 @@ import pytest
 from one_line import complaint_of
 from schoolroom import Matrix, Schoolroom
 from stuck import StuckRoom, StuckTogether, acts, trains
-from taught import PROXY, make_taught, setup
+from taught import PROXY, make_taught, run, setup
 from tightrope import Cells, Tightrope
 from wobbly import Wobbly
 
 from proxytune.cli.terminal import signals_as_interruptions
 from proxytune.errors import EpisodeError, LearnerError, RunError
 from proxytune.learning import Cache, Distribution, TeachingSettings, facts_digest
-from proxytune.running import Silent
 from proxytune.study import read_study_settings
-from proxytune.teaching import load_setup, run_experiment
+from proxytune.teaching import load_setup
 from proxytune.teaching.examining import prepare_points, score_points
 from proxytune.teaching.points import CurvePoint, TeachingSetup, equal_rounds
 
@@ -235,9 +234,8 @@ def test_equal_rounds_end_with_the_last_sample(count, rounds, ends):
     assert equal_rounds(count, rounds) == ends
 
 
-def run(folder):
-    settings = read_study_settings(folder)
-    found = run_experiment(settings, load_setup(settings), Silent())
+def scores_of(folder):
+    found = run(folder)
     return np.stack([found.without.scores, *(one.curve.scores for one in found.teachers)])
 
 
@@ -254,12 +252,12 @@ def make_tightrope(make_study, tmp_path, *, more=ON_POLICY, grid=GRID, **changes
 @pytest.mark.parametrize(("lost", "jobs"), [("weights", "1"), ("samples", "2")])
 def test_a_run_of_learners_that_drive_comes_to_the_same_whatever_its_cache_has_lost(make_study, tmp_path, lost, jobs):
     folder = make_tightrope(make_study, tmp_path, grid=GRID[:4], jobs=jobs)
-    whole = run(folder)
+    whole = scores_of(folder)
     for path in sorted((folder / "teaching").glob(f"{lost}-*.npz"))[::2]:
         path.unlink()
     for path in sorted((folder / "teaching").glob("exam-*.npz"))[::3]:
         path.unlink()
-    np.testing.assert_array_equal(run(folder), whole)
+    np.testing.assert_array_equal(scores_of(folder), whole)
 
 
 @pytest.mark.parametrize("jobs", ["1", pytest.param("2", marks=pytest.mark.slow)])

@@ -11,7 +11,7 @@ import signal
 import numpy as np
 import pytest
 from failing_disk import HOOKED, forking
-from processes import besides_progress, episodes, finished_episodes, trials
+from processes import besides_progress, but_for, episodes, finished_episodes, trials
 from taught import make_taught
 
 from proxytune.storage import Store
@@ -170,19 +170,11 @@ def made(forker, folder):
     )
     paths = [path for path in sorted(folder.rglob("*")) if path.is_file() and not path.name.startswith(".")]
     files = {str(path.relative_to(folder)): content(path, folder) for path in paths}
-    return but_for_times(document), files
+    return but_for(document, ("seconds", "episodes")), files
 
 
 def content(path, folder):
     return b"" if path.name in TIMED else TIMES.sub(b"", path.read_bytes().replace(str(folder).encode(), b"HERE"))
-
-
-def but_for_times(document):
-    if isinstance(document, list):
-        return [but_for_times(one) for one in document]
-    if isinstance(document, dict):
-        return {key: but_for_times(value) for key, value in document.items() if key not in ("seconds", "episodes")}
-    return document
 
 
 def test_a_sweep_broken_off_at_any_write_comes_to_the_same_curve(broken_off, swept):

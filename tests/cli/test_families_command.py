@@ -9,7 +9,7 @@ import pytest
 from one_line import complaint_of
 from several import make_several
 from stopping import Stopping
-from taught import TEACHING
+from taught import make_taught_families
 
 from proxytune.api import read_families, run_opened_families
 from proxytune.api.families import run_families
@@ -220,11 +220,8 @@ def test_from_python_one_asks_the_same(finished):
 
 def make_taught(make_study, families):
     """A study of families that teach."""
-    table = TEACHING.format(grid=[0, 20, 40, 80, 160, 320], more="").split("[teaching.proxies.right]")[0]
-    own = {"called": "taught", "family": '"schoolroom:schoolroom"', "proxy": '"right.toml"'}
-    folder = make_several(make_study, families=table + families, **own)
-    (folder / "twin.toml").write_text("trim = 0.1\ndelay = 0.12\n")
-    return folder
+    own = {"twin": "trim = 0.1\ndelay = 0.12\n", "called": "taught", "proxy": '"right.toml"'}
+    return make_taught_families(make_study, families, grid=[0, 20, 40, 80, 160, 320], **own)
 
 
 @pytest.fixture(scope="module")

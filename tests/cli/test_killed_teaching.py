@@ -7,7 +7,7 @@ import signal
 
 import pytest
 from launched import Launched, launching
-from processes import finished_episodes, trials
+from processes import but_for, finished_episodes, trials
 from several import make_several
 from taught import TEACHING, make_taught
 
@@ -142,12 +142,6 @@ def make_families(make_study):
     return folder
 
 
-def but_for_times(document):
-    if isinstance(document, dict):
-        return {key: but_for_times(value) for key, value in document.items() if key not in TIMES}
-    return document
-
-
 def test_families_killed_in_a_search_and_in_lessons_come_to_the_same_but_for_times(make_study, commands):
     folder = make_families(make_study)
     assert commands.run("study", folder) == 0, commands.printed
@@ -161,4 +155,4 @@ def test_families_killed_in_a_search_and_in_lessons_come_to_the_same_but_for_tim
     assert kept[1][0] == of_right, "within that of the second"
     assert 0 < kept[1][1] < of_far
     assert kept[2:] == [[of_right, of_far]] * 3, "in its lessons"
-    assert but_for_times(json.loads(commands.document)) == but_for_times(whole)
+    assert but_for(json.loads(commands.document), TIMES) == but_for(whole, TIMES)

@@ -34,6 +34,15 @@ def besides_progress(told):
     return "".join(line for line in lines if not re.match(r"compare: at most|proxytune study: page: |\d+ s: ", line))
 
 
+def but_for(document, keys):
+    """A document without what stands under these keys, wherever they are."""
+    if isinstance(document, list):
+        return [but_for(one, keys) for one in document]
+    if isinstance(document, dict):
+        return {key: but_for(value, keys) for key, value in document.items() if key not in keys}
+    return document
+
+
 def finished_episodes(folder):
     """How many episodes are in study.db."""
     try:

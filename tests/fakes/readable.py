@@ -1,6 +1,7 @@
 """Figures as the column of a paper takes them, and texts as a terminal shows them."""
 
 import io
+import warnings
 
 import pytest
 from matplotlib.text import Text
@@ -18,6 +19,16 @@ def assert_readable(*figures, points=6.0):
         legends = [legend.get_window_extent() for legend in figure.legends]
         assert all(figure.bbox.x0 - 1 <= box.x0 <= box.x1 <= figure.bbox.x1 + 1 for box in (*boxes, *legends))
         assert not any(legend.overlaps(box) for legend in legends for box in boxes)
+
+
+def drawn_without_a_warning(make):
+    """Figures by name, as they are made, each drawn once."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        figures = make()
+        for figure in figures.values():
+            figure.draw_without_rendering()
+    return figures
 
 
 def on_terminal(*texts, width=160):

@@ -1,8 +1,9 @@
 """Studies whose domain family is a schoolroom, and a twin to teach for; and the same without a study."""
 
-from dataclasses import replace
+from dataclasses import fields, replace
 
 from schoolroom import Matrix, Schoolroom
+from several import make_several
 from wobbly import Wobbly
 
 from proxytune.learning import Cache, Distribution, TeachingSettings
@@ -42,6 +43,14 @@ def make_taught(make_study, *, grid=GRID, more="", **changes):
     return folder
 
 
+def make_taught_families(make_study, families, *, grid, twin, **changes):
+    """A study's folder whose families, several schoolrooms, teach for this twin."""
+    table = TEACHING.format(grid=grid, more="").split("[teaching.proxies.right]")[0]
+    folder = make_several(make_study, families=table + families, **{"family": '"schoolroom:schoolroom"', **changes})
+    (folder / "twin.toml").write_text(twin)
+    return folder
+
+
 def run(folder, watcher=None):
     """The learning experiment of a study's folder, run to its end."""
     settings = read_study_settings(folder)
@@ -52,8 +61,9 @@ PROXY = Distribution({"trim": (0.1, 0.2)})
 
 
 def setup(folder, **changes):
-    """An experiment ready to run, small, with changes of it or of its amounts."""
-    amounts = {key: changes.pop(key) for key in ("proxy_samples", "lesson_s", "rehearsal") if key in changes}
+    """An experiment ready to run, small, with changes of it or of its settings."""
+    own = {one.name for one in fields(TeachingSetup)}
+    amounts = {key: changes.pop(key) for key in changes.keys() - own}
     settings = TeachingSettings(
         target=folder / "twin.toml",
         learner="schoolroom:Matrix",

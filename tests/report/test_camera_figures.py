@@ -1,13 +1,12 @@
 """The document, figures and sentences of a camera's diagnosis, on frames whose camera is known."""
 
 import math
-import warnings
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from pictured import ROBOT
-from readable import assert_readable
+from readable import assert_readable, drawn_without_a_warning
 
 from proxytune.diagnosis import Blemish, CameraEffect, Estimate, LaidLine, LaidMap
 from proxytune.diagnosis.camera import error as weighing
@@ -44,12 +43,7 @@ def clean(diagnosis):
 
 @pytest.fixture(scope="module")
 def figures(diagnosis):
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        drawn = camera_figures(diagnosis)
-        for figure in drawn.values():
-            figure.draw_without_rendering()
-    return drawn
+    return drawn_without_a_warning(lambda: camera_figures(diagnosis))
 
 
 def leaves(value):

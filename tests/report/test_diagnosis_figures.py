@@ -1,7 +1,6 @@
 """Figures of a diagnosis of motion and their captions."""
 
 import re
-import warnings
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,7 +9,7 @@ import numpy as np
 import pytest
 from matplotlib.container import ErrorbarContainer
 from planted import ROBOT, TRUTH, planted_drives
-from readable import assert_readable
+from readable import assert_readable, drawn_without_a_warning
 
 import proxytune
 from proxytune.diagnosis import (
@@ -66,13 +65,7 @@ def clean(diagnosis):
 
 @pytest.fixture(scope="module")
 def figures(diagnosis):
-    """Every figure, drawn once without a warning."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        figures = motion_figures(diagnosis)
-        for figure in figures.values():
-            figure.draw_without_rendering()
-    return figures
+    return drawn_without_a_warning(lambda: motion_figures(diagnosis))
 
 
 def without_effects(diagnosis, unnamed_curves=()):
@@ -151,7 +144,6 @@ def test_residuals_over_time_are_those_of_the_windows_on_an_axis_that_says_why_i
     (axes,) = figures["residual_over_time"].axes
     drawn = [one.get_ydata() for one in axes.get_lines() if one.get_color() == line(axes, AFTER).get_color()]
     assert np.concatenate(drawn) == pytest.approx(expected)
-    assert figures["residual_over_time"].axes[0].get_xlabel() == "time in the episode [s]"
     late = drives.only(drives.first >= int(drives.last.max() // 2))
     both = strayed(replace(diagnosis, parts=diagnosis.parts._replace(tested=late)))
     assert "the first was fitted" in residual_over_time(late, both).axes[0].get_xlabel()
@@ -366,10 +358,7 @@ def learning(*groups):
 
 @pytest.mark.slow
 def test_every_group_is_drawn_without_a_warning_and_every_panel_has_units():
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        figure = learnt_figure(learning(*GROUPS))
-        figure.draw_without_rendering()
+    figure = drawn_without_a_warning(lambda: {"learnt": learnt_figure(learning(*GROUPS))})["learnt"]
     shown = [axes for axes in figure.axes if axes.get_visible()]
     assert all("[" in axes.get_ylabel() for axes in shown)
     assert all("[" in axes.get_xlabel() for axes in shown if axes.get_xlabel())

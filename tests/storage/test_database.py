@@ -113,21 +113,18 @@ def with_next_format(tmp_path, monkeypatch):
     return path
 
 
-def facts_in(connection):
-    (version,) = connection.execute("PRAGMA user_version").fetchone()
-    return version, connection.execute("SELECT key, value, source FROM facts").fetchall()
+def facts_in(path):
+    with closing(database.connect(path, writable=False)) as connection:
+        (version,) = connection.execute("PRAGMA user_version").fetchone()
+        return version, connection.execute("SELECT key, value, source FROM facts").fetchall()
 
 
 def test_the_next_format_reads_this_one_converts_it_when_it_writes_and_takes_nothing_damaged(with_next_format):
     before = with_next_format.read_bytes()
-    connection = database.connect(with_next_format, writable=False)
-    assert facts_in(connection) == (database.FORMAT, [("seed", "1", "here")])
-    connection.close()
+    assert facts_in(with_next_format) == (database.FORMAT, [("seed", "1", "here")])
     assert with_next_format.read_bytes() == before
     database.disconnect(database.connect(with_next_format, writable=True))
-    connection = database.connect(with_next_format, writable=False)
-    assert facts_in(connection) == (database.FORMAT, [("seed", "1", "here")])
-    connection.close()
+    assert facts_in(with_next_format) == (database.FORMAT, [("seed", "1", "here")])
     assert with_next_format.read_bytes() != before
     with sqlite3.connect(with_next_format) as plain:
         plain.execute("UPDATE facts SET value = '2'")

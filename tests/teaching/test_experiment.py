@@ -12,8 +12,7 @@ from types import MappingProxyType, SimpleNamespace
 
 import numpy as np
 import pytest
-from several import make_several
-from taught import GRID, TEACHING, make_taught, run
+from taught import GRID, make_taught, make_taught_families, run
 from telling import Telling
 
 from proxytune.errors import EpisodeError, LearnerError, SettingsError
@@ -154,11 +153,8 @@ def taught(make_study):
     """A study of several schoolrooms."""
 
     def make(families="[families.right]\n[families.far]\n", grid=STEPS, **changes):
-        table = TEACHING.format(grid=grid, more="").split("[teaching.proxies.right]")[0]
-        changes = {"family": '"schoolroom:schoolroom"', **changes}
-        folder = make_several(make_study, families=table + families, **changes)
-        (folder / "twin.toml").write_text("trim = 0.12\ndelay = 0.21\n")
-        return read_study_settings(folder)
+        twin = "trim = 0.12\ndelay = 0.21\n"
+        return read_study_settings(make_taught_families(make_study, families, grid=grid, twin=twin, **changes))
 
     return make
 

@@ -19,11 +19,11 @@ from wobbly import Wobbly
 
 from proxytune.cli.terminal import signals_as_interruptions
 from proxytune.errors import EpisodeError, LearnerError, RunError
-from proxytune.learning import Cache, Distribution, TeachingSettings, facts_digest
+from proxytune.learning import Cache, Distribution, facts_digest
 from proxytune.study import read_study_settings
 from proxytune.teaching import load_setup
 from proxytune.teaching.examining import prepare_points, score_points
-from proxytune.teaching.points import CurvePoint, TeachingSetup, equal_rounds
+from proxytune.teaching.points import CurvePoint, equal_rounds
 
 
 @dataclass(frozen=True)
@@ -125,31 +125,11 @@ ON_POLICY = 'target_lessons = "learner"\nproxy_lessons = "learner"'
 
 def staged(folder, **changes):
     """An experiment on the tightrope; the target's deviations grow faster than the proxy's."""
-    settings = TeachingSettings(
-        target=folder / "twin.toml",
-        learner="tightrope:Cells",
-        proxy_samples=40,
-        target_samples=GRID,
-        seeds=4,
-        lesson_s=2.0,
-        level=None,
-        tolerance=5.0,
-        budget=1,
-        narrow=False,
-        widths={},
-        proxies={"near": NEAR},
-    )
     folder.mkdir(exist_ok=True)
-    return TeachingSetup(
-        proxy=Tightrope(Wobbly()),
-        target=Tightrope(Wobbly(theta=(("trim", 0.1),)), journal=str(folder / "journal")),
-        learner=Cells(),
-        learner_identity="cells",
-        settings=replace(settings, **changes),
-        seed=1,
-        starts=5,
-        cache=Cache(folder / "cache"),
-    )
+    target = Tightrope(Wobbly(theta=(("trim", 0.1),)), journal=str(folder / "journal"))
+    domains = {"proxy": Tightrope(Wobbly()), "target": target, "starts": 5, "cache": Cache(folder / "cache")}
+    amounts = {"proxy_samples": 40, "target_samples": GRID, "seeds": 4, "tolerance": 5.0, "proxies": {"near": NEAR}}
+    return setup(folder, learner=Cells(), learner_identity="cells", **domains, **{**amounts, **changes})
 
 
 def mean_scores(made, proxy):

@@ -178,13 +178,12 @@ def test_drives_share_a_file_of_commands_by_time_where_they_do_not_overlap_and_e
     first, second = read(tmp_path).drives
     np.testing.assert_array_equal(first.commands.values[:, 0], [0.1, 0.2])
     np.testing.assert_array_equal(second.commands.values[:, 0], [0.3, 0.4])
-    file(POSES, "a.csv"), file(POSES, "b.csv"), file(COMMANDS, "commands.csv")
+    file(POSES, "b.csv"), file(COMMANDS, "commands.csv")
     assert "add a column 'episode'" in complaint(tmp_path)
     file("episode,time,v,omega\nb,0,1,0\nb,0.1,1,0\na,0.1,2,0\n", "commands.csv")
     assert [drive.commands.values[0, 0] for drive in read(tmp_path).drives] == [2.0, 1.0]
     file("episode,time,v,omega\nb,0,1,0\nc,0.1,1,0\n", "commands.csv")
     assert "drive 'c' has no poses" in complaint(tmp_path)
-    file(POSES, "a.csv")
     file(POSES.replace("\n0", "\n10"), "b.csv")
     commands = file("episode,time,v,omega\nb,0,1,0\nb,0.1,1,0\n", "commands.csv")
     assert complaint(tmp_path) == (f"{commands}: has no commands for drive 'a'; add them, or leave its poses out")

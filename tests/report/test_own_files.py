@@ -232,7 +232,6 @@ def test_what_would_overwrite_or_misread_the_users_own_is_refused(model, tmp_pat
     (tmp_path / "mine.urdf").write_text(URDF)
     told = complaint_of(export, tmp_path / "found", tmp_path / "out.urdf", into=tmp_path / "mine.urdf")
     assert re.search("is no study's folder; give what was diagnosed, .*found/model.toml", told)
-    (tmp_path / "mine.urdf").write_text(URDF)
     told = complaint_of(export, model, tmp_path / "mine.urdf", into=tmp_path / "mine.urdf")
     assert "mine.urdf: is read by this command, and would be lost" in told
     assert "model.toml: is read by this command" in complaint_of(lambda: export(model, model, to="ros"))

@@ -86,7 +86,7 @@ HELD_OUT = [design_point(SPACE, index, 9) for index in range(64)]
 
 def test_smooth_outputs_are_predicted_with_errors_as_their_variance_says_and_others_not_trusted():
     model = fit_outputs(SPACE, trials(32))
-    mean, _ = model.predict(unit_array(SPACE, HELD_OUT))
+    mean, variance = model.predict(unit_array(SPACE, HELD_OUT))
     truth = np.array([five_outputs(values) for values in HELD_OUT])
     errors = np.sqrt(np.mean((mean - truth) ** 2, axis=0))
     assert errors[0] < 0.05
@@ -94,7 +94,6 @@ def test_smooth_outputs_are_predicted_with_errors_as_their_variance_says_and_oth
     assert model.rough[2] > 10.0 * model.rough[0]
     assert np.isnan(mean[:, 3]).all()
     assert model.constant[3] == 60.0
-    mean, variance = model.predict(unit_array(SPACE, HELD_OUT))
     squares = np.mean((truth - mean)[:, :3] ** 2 / (variance + model.rough)[:, :3], axis=0)
     assert (squares > 0.05).all()
     assert (squares < 5.0).all()
@@ -138,11 +137,9 @@ def test_few_trials_correct_a_cheaper_proxy_and_one_that_does_something_else_mak
     # What it says is not believed: errors are as large as the model says.
     own = [Trial(values, 1.0, better(values)) for values in (design_point(SPACE, index, 1) for index in range(12))]
     draws = np.random.default_rng(1).normal(0.0, 2.0, (64, 2))
-    points = [design_point(SPACE, index, 2) for index in range(64)]
     low = [Trial(p, None, tuple(row), low_fidelity=True) for p, row in zip(points, draws.tolist(), strict=True)]
     model = fit_outputs(SPACE, [*low, *own])
-    mean, variance = model.predict(unit_array(SPACE, HELD_OUT))
-    truth = np.array([better(values) for values in HELD_OUT])
+    mean, variance = model.predict(unit)
     assert np.sqrt(((mean - truth) ** 2 / (variance + model.rough)).mean()) < 1.5
 
 

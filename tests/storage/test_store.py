@@ -107,13 +107,12 @@ def test_facts_are_added_and_beginning_afresh_drops_trials_alone(tmp_path):
 
 
 def test_seconds_are_averaged_over_instances_and_trials_have_those_of_their_own(tmp_path):
+    elsewhere = make_episode({"trim": 0.2}, agent="agent1", start=2, seed=11)
     with Store.open(tmp_path) as store:
         store.save_outcome("identity", WORKED)
-        elsewhere = make_episode({"trim": 0.2}, agent="agent1", start=2, seed=11)
         store.save_outcome("identity", Outcome(elsewhere, {"distance": 1.0}, "", 0.5))
         assert store.seconds() == {("agent1", 2): 1.0}
 
-    elsewhere = make_episode({"trim": 0.2}, agent="agent1", start=2, seed=11)
     with Store.open(tmp_path) as store:
         assert store.seconds_of_trials("prpv", 9, {11}) == 0.0
         store.save_outcome("identity", WORKED)

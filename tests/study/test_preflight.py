@@ -69,27 +69,18 @@ def test_noise_is_that_of_placement_and_less_with_repeats(make_study):
     with running(make_study(preflight="true")) as study_run:
         run_preflight(study_run)
         found, pairs = preflight.noise_of(study_run), preflight.placement_pairs(study_run)
+        unknown = preflight.noise_of(StudyRun(open_study(make_study(preflight="false")), study_run.store))
+        folder = make_study(preflight="true")
+        edited(folder, twice)
+        study = open_study(folder)
+        assert preflight.shares_starts(study)
+        again = preflight.noise_of(StudyRun(study, study_run.store))
     assert found.caution == ""
     assert pairs.shape[1:] == (2, 6, 2)
     # Wobbly's scores wobble by 0.15, so a difference of two means over three starts has a variance of 2 · 0.15² / 3.
     assert np.median(found.variance) == pytest.approx(2 * 0.15**2 / 3, rel=0.8)
     assert (found.variance > 0.0).all()
-
-    folder = make_study(preflight="true")
-    with running(folder) as study_run:
-        run_preflight(study_run)
-        once = preflight.noise_of(study_run)
-        edited(folder, twice)
-        study = open_study(folder)
-        assert preflight.shares_starts(study)
-        again = preflight.noise_of(StudyRun(study, study_run.store))
-    assert again.variance == pytest.approx(0.75 * once.variance)
-
-    with running(make_study(preflight="true")) as study_run:
-        run_preflight(study_run)
-        known = preflight.noise_of(study_run)
-        unknown = preflight.noise_of(StudyRun(open_study(make_study(preflight="false")), study_run.store))
-    assert known.caution == ""
+    assert again.variance == pytest.approx(0.75 * found.variance)
     assert unknown.caution.startswith("noise is estimated from the spread between the target's episodes")
 
 

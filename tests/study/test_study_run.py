@@ -193,7 +193,6 @@ def test_the_score_is_what_the_usefulness_room_says_of_the_tables_in_any_order_o
     assert found.prpv == prpv(compare(**sides)).value > 0
     assert found.measures["ppv"] == ppv(compare(**sides)).value
     assert found.failures == ()
-    study = open_study(make_study())
     outcomes = [Outcome(e, study.family.run(e), "", 0.0) for e in plan_episodes(study.settings, THETA, 1)]
     forth, back = evaluate_outcomes(study, THETA, outcomes), evaluate_outcomes(study, THETA, outcomes[::-1])
     assert (forth.prpv, forth.measures["ppv"]) == (back.prpv, pytest.approx(back.measures["ppv"], abs=1e-12))

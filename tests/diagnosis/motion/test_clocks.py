@@ -226,8 +226,8 @@ def test_one_clock_is_left_and_commands_are_put_on_that_of_the_poses():
 
 
 def test_poses_before_the_first_command_or_beyond_a_jump_are_left_out_also_at_times_of_their_own():
-    found = clocks(in_one_drive(0.5, after=500))
     log = hidden.make_log(CASE, late_s=in_one_drive(0.5, after=500), **SHORT)
+    found = read_clocks(log, ROBOT)
     poses = [episode.poses for episode in timing.put_on_one_clock(log, found).episodes]
     assert np.isfinite(poses[3]).all(axis=1).sum() == pytest.approx(found.kept_s[3, 1] * 20.0, abs=1)
     assert np.isnan(poses[3][500:]).all()
@@ -236,7 +236,7 @@ def test_poses_before_the_first_command_or_beyond_a_jump_are_left_out_also_at_ti
     for episode in timing.put_on_one_clock(hidden.make_log(CASE, **SHORT), late).episodes:
         assert np.isnan(episode.poses[:20]).all()
         assert np.isfinite(episode.poses[20]).all()
-    found, drives = read_clocks(log, ROBOT), list(log.episodes)
+    drives = list(log.episodes)
     measured = Measured(drives[3].times[::2] + 0.01, drives[3].poses[::2], np.arange(0, 800, 2))
     drives[3] = replace(drives[3], measured=measured)
     kept = timing.put_on_one_clock(replace(log, episodes=tuple(drives)), found).episodes[3]
@@ -280,20 +280,6 @@ def test_each_stretch_between_long_rests_is_a_drive_and_logs_without_any_are_lef
     np.testing.assert_array_equal(second.commands, second.wheels)
     np.testing.assert_array_equal(second.commands, whole.episodes[0].commands[2380:3060])
 
-    whole = log((10.0, 80.0), (95.0, 190.0))
-    assert cut_out_long_rests(whole) is whole
-
-    whole = log()
-    issued = np.array([0.0, 50.0, 60.0, 150.0, 170.0])
-    commands = np.array([[0, 0], [0.5, 0.5], [0, 0], [0.2, 0.2], [0, 0]])
-    own = replace(whole.episodes[0], issued=issued, commands=commands)
-    first, second = cut_out_long_rests(replace(whole, episodes=(own,))).episodes
-    np.testing.assert_array_equal(first.issued, [0.0, 50.0, 60.0])
-    np.testing.assert_array_equal(second.issued, [60.0, 150.0, 170.0])
-    np.testing.assert_array_equal(second.held[[0, -1]], [[0, 0], [0, 0]])
-    np.testing.assert_array_equal(second.commands, commands[2:])
-
-    whole = log((30.0, 50.0), (60.0, 70.0), (120.0, 150.0))
     (episode,) = whole.episodes
     rows = np.arange(0, 4000, 3)
     measured = Measured(episode.times[rows] + 0.01, episode.poses[rows], rows)
@@ -301,9 +287,21 @@ def test_each_stretch_between_long_rests_is_a_drive_and_logs_without_any_are_lef
     for piece in cut_out_long_rests(own).episodes:
         np.testing.assert_allclose(piece.times[piece.measured.rows] + 0.01, piece.measured.times)
         assert len(piece.measured.times) == pytest.approx(len(piece.times) / 3, abs=1)
+
+    whole = log((10.0, 80.0), (95.0, 190.0))
+    assert cut_out_long_rests(whole) is whole
+
     still, frames = log(), replace(log(), command="none")
     assert cut_out_long_rests(still) is still
     assert cut_out_long_rests(frames) is frames
+    issued = np.array([0.0, 50.0, 60.0, 150.0, 170.0])
+    commands = np.array([[0, 0], [0.5, 0.5], [0, 0], [0.2, 0.2], [0, 0]])
+    own = replace(still.episodes[0], issued=issued, commands=commands)
+    first, second = cut_out_long_rests(replace(still, episodes=(own,))).episodes
+    np.testing.assert_array_equal(first.issued, [0.0, 50.0, 60.0])
+    np.testing.assert_array_equal(second.issued, [60.0, 150.0, 170.0])
+    np.testing.assert_array_equal(second.held[[0, -1]], [[0, 0], [0, 0]])
+    np.testing.assert_array_equal(second.commands, commands[2:])
 
 
 def test_drives_are_split_by_motion_and_another_log_may_be_tested_on():
@@ -398,7 +396,6 @@ def test_of_drives_of_two_seconds_fewer_are_taken_whole_and_else_blocks_shortene
     few = thin(cut_into_blocks(planted_drives(TRUTH, episodes=60, seconds=2.1, noise=None)))
     assert timing.FEWEST_BLOCKS <= len(set(few.block)) < 60
     assert len(cut(few, 2.0).begin) == len(set(few.block))
-    monkeypatch.setattr(timing, "MOST", 300)
     monkeypatch.setattr(timing, "STRETCH_S", 1.0)
     few = thin(drives)
     assert 250 <= len(few.episode) <= 300 + len(set(drives.block))

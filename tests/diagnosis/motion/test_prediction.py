@@ -50,8 +50,7 @@ def test_windows_cover_every_row_headings_go_on_and_a_stub_at_the_end_is_not_cou
     table = predict(log, ROBOT, TRUTH, 5.0)
     for _, window in table.groupby(["episode", "start_time"]):
         assert np.abs(np.diff(window.heading)).max() < 0.5
-    far = planted_log(TRUTH, episodes=1, seconds=10.0, noise=None)
-    turned = with_poses(far, lambda poses: poses + (0.0, 0.0, 40.0))
+    turned = with_poses(log, lambda poses: poses + (0.0, 0.0, 40.0))
     assert predict(turned, ROBOT, TRUTH, 5.0).heading.iloc[0] == pytest.approx(turned.episodes[0].poses[0, 2])
     table = predict(log, ROBOT, {**TRUTH, "trim": 0.1}, 1.9)
     found = agreement(table, log, 1.9)
@@ -71,12 +70,11 @@ def test_exact_models_predict_random_effects_by_their_mean_and_noiseless_logs_sl
     assert (found.poses, found.windows) == (2 * 199, 10)
 
     theta = {**TRUTH, "floor_slope.x": 0.04, "floor_slope.y": -0.02}
-    log = planted_log(theta, episodes=3, seconds=10.0, noise=None)
-    assert agreement(predict(log, ROBOT, theta, 2.0), log, 2.0).place < 1e-6
-    assert agreement(predict(log, ROBOT, TRUTH, 2.0), log, 2.0).place > 0.01
+    sloped = planted_log(theta, episodes=3, seconds=10.0, noise=None)
+    assert agreement(predict(sloped, ROBOT, theta, 2.0), sloped, 2.0).place < 1e-6
+    assert agreement(predict(sloped, ROBOT, TRUTH, 2.0), sloped, 2.0).place > 0.01
 
     theta = {**TRUTH, "marker_offset.forward": 0.05, "heading_offset": 3.0}
-    plain = planted_log(TRUTH, episodes=2, seconds=10.0, noise=None)
 
     def seen(poses):
         out = poses.copy()
@@ -84,8 +82,8 @@ def test_exact_models_predict_random_effects_by_their_mean_and_noiseless_logs_sl
         out[:, 2] += np.radians(3.0)
         return out
 
-    log = with_poses(plain, seen)
-    assert agreement(predict(log, ROBOT, theta, 2.0), log, 2.0).place < 1e-6
+    marked = with_poses(log, seen)
+    assert agreement(predict(marked, ROBOT, theta, 2.0), marked, 2.0).place < 1e-6
 
 
 @pytest.mark.parametrize("extra", [TURNING, MANY], ids=["turning", "many"])
@@ -176,11 +174,10 @@ def test_repeats_show_what_a_model_lacks_as_far_as_drives_go_and_are_repeated():
     assert compare_repeats(repeated_drives(replace(log, episodes=(one, stub))), TRUTH, 1.0) is None
     assert compare_repeats(again(2, seconds=3.0), TRUTH, 5.0) is None
     duties, starts = make_drives(3, 2, 600)
-    duties, starts = np.concatenate((duties, duties[:1])), np.concatenate((starts, starts[:1]))
-    assert 0.3 < compare_repeats(repeated_drives(driven_log(TRUTH, duties, starts)), TRUTH, 1.0).part < 0.9
-    duties, starts = make_drives(3, 2, 600)
     log = driven_log(TRUTH, duties, starts)
     assert compare_repeats(repeated_drives(replace(log, episodes=(*log.episodes, *log.episodes))), TRUTH, 1.0) is None
+    duties, starts = np.concatenate((duties, duties[:1])), np.concatenate((starts, starts[:1]))
+    assert 0.3 < compare_repeats(repeated_drives(driven_log(TRUTH, duties, starts)), TRUTH, 1.0).part < 0.9
     duties, starts = make_drives(4, 6, 400)
     duties[:, :200] = 0.0
     assert compare_repeats(repeated_drives(driven_log(TRUTH, duties[:5], starts[:5])), TRUTH, 2.0) is None

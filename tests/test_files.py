@@ -1,7 +1,4 @@
-"""A file is the old one or the new one, whatever happens between.
-
-Robots and studies are found beside the package.
-"""
+"""A file is the old one or the new one, whatever happens between."""
 
 import os
 import subprocess

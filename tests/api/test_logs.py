@@ -1,8 +1,4 @@
-"""A diagnosis from Python: what is found, as tables, figures and files, and errors in Python's words.
-
-A diagnosis of frames from Python: the camera's figures beside those of motion, and errors in Python's words.
-A log from DataFrames is the log of the same files, and its faults are told by row and column.
-"""
+"""A diagnosis from Python, of drives and of frames, and a log from DataFrames: errors are in Python's words."""
 
 import json
 import re

@@ -1,7 +1,4 @@
-"""A study killed at every write, and on a disk that is full from every write on, goes on to the same trials.
-
-`sweep` and `teach`, killed or on a full disk at their first writes to their last, make the same.
-"""
+"""A study, a sweep and lessons killed at a write, or on a disk that is full from it on, come to the same."""
 
 import itertools
 import json

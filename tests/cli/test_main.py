@@ -1,11 +1,4 @@
-"""Every command answers in one document, and every mistake in one line with its exit status.
-
-Every command's help has examples, and each of them is one that the command understands.
-
-`completion` prints a script that the shell reads and that completes commands, options and files.
-
-Standard output is the answer alone, in whatever letters it can hold.
-"""
+"""Each command: one document or one line of complaint, examples in its help, completion; stdout is the answer alone."""
 
 import errno
 import json

@@ -1,7 +1,4 @@
-"""The error at a horizon is told before and after, against the best that any model reached.
-
-The verdict follows from the error that is left, against the bracket of the noise floor.
-"""
+"""The error at a horizon before and after, and the verdict that follows from what is left of it."""
 
 from dataclasses import replace
 

@@ -1,7 +1,4 @@
-"""A car drives as its figures say on both plants, its effects do by hand what they say, and ours drive it along lanes.
-
-Robots and maps that do not go with a car are refused in a line.
-"""
+"""A car drives as its figures and effects say, on both plants; what does not go with a car is refused in a line."""
 
 import tomllib
 

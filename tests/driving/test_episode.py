@@ -1,8 +1,4 @@
-"""An episode is the same for the same seed, ends when it should, and fails loudly.
-
-Both plants drive as the reference model says, and like each other.
-Lane following scores hand-made drives as its definitions say.
-"""
+"""An episode is the same for the same seed, drives as the reference model says, is scored, and fails loudly."""
 
 import dataclasses
 import functools

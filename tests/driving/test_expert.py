@@ -1,7 +1,4 @@
-"""The expert keeps to the lane by the true pose, and shows how to come back to it when it is pushed off.
-
-Lane following as a classroom: what its expert shows, and what a policy scores.
-"""
+"""The expert keeps to the lane by the true pose and comes back to it: a classroom of lane following."""
 
 import dataclasses
 import functools

@@ -1,7 +1,4 @@
-"""Under which name episodes of driving are kept: what changes it besides our code, and what does not.
-
-A mounted camera is the robot's nominal one but for the figures that camera effects set.
-"""
+"""Under which name episodes of driving are kept, and that the mounted camera is the robot's but for its effects."""
 
 import shutil
 from pathlib import Path

@@ -1,8 +1,4 @@
-"""A map of one's own is a file beside the study; what cannot be driven is refused in one line.
-
-On every map the road that is scored, the one that is followed and the one that is drawn are one and the same.
-The floor of small_loop stays as it was before roads were lists of segments.
-"""
+"""On every map, also of one's own, the road that is scored, followed and drawn is one and the same."""
 
 import dataclasses
 import functools

@@ -1,7 +1,4 @@
-"""Distances to markings are those that floors are painted with, their slopes are true, and lines have their names.
-
-The floor's picture has the map's figures: measured on the picture, not on the code that draws it.
-"""
+"""The floor's picture, measured on the picture: the map's figures, distances to markings, and names of lines."""
 
 from dataclasses import replace
 from typing import NamedTuple

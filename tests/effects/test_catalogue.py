@@ -1,8 +1,4 @@
-"""The catalogue is in the order in which the signal meets the effects, and that order changes what comes out.
-
-What every effect promises, run over the whole catalogue.
-Each filter against what it should do by hand.
-"""
+"""The catalogue is in the order in which the signal meets effects, each of which keeps what effects promise."""
 
 import numpy as np
 import pytest

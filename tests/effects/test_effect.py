@@ -1,7 +1,4 @@
-"""Values known beforehand are used; beyond them the rates go on.
-
-A first-order lag, exact for what holds over each sample.
-"""
+"""A first-order lag, exact for what holds over each sample, and values known beforehand."""
 
 import sys
 

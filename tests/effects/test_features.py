@@ -1,7 +1,4 @@
-"""Hats are curves that vanish at 0 and stay level beyond their last knot.
-
-What was before is remembered the same, however a signal is cut.
-"""
+"""Hats vanish at 0 and stay level beyond their last knot, and memory is the same however a signal is cut."""
 
 import numpy as np
 import pytest

@@ -1,11 +1,4 @@
-"""Dead band, stiction and backlash against what they should do by hand.
-
-A wheel that is not round rolls faster and slower once a turn.
-
-Motors that rise slowly and tire under load.
-
-Saturation and battery sag against what they should do by hand.
-"""
+"""Effects on the wheels, from dead band to battery sag, against what they should do by hand."""
 
 import numpy as np
 import pytest

@@ -1,7 +1,4 @@
-"""What lens and sensor do to each picture, against what it should be by hand.
-
-From which instants a picture is made: ages of pictures and of their rows, against what they should be by hand.
-"""
+"""What lens and sensor do to each picture, and from which instants it is made, against what should be by hand."""
 
 import numpy as np
 import pytest

@@ -1,7 +1,4 @@
-"""What is learnt is an effect like any other, and harmless where nothing was seen.
-
-A learnt effect is named values of θ, and tables of a model.toml that read back as the same values.
-"""
+"""What is learnt is an effect like any other, harmless where nothing was seen, and named values of θ."""
 
 import math
 from itertools import pairwise

@@ -1,8 +1,4 @@
-"""Slopes push and patches slip where the robot is, by poses known beforehand or by its own motion.
-
-Effects on the body's motion and on the measured pose against what they should do by hand.
-Driving and turning mix as the formulas say.
-"""
+"""Effects on the body's motion and on the measured pose against what they should do by hand."""
 
 import numpy as np
 import pytest

@@ -1,7 +1,4 @@
-"""Episodes of an environment: how they are scored, how they end, and what fails them.
-
-A Gymnasium environment is a domain family like any other.
-"""
+"""A Gymnasium environment is a domain family like any other: how episodes are scored, end and fail."""
 
 import dataclasses
 import importlib.metadata

@@ -1,7 +1,4 @@
-"""Lane following as a Gymnasium environment: the episodes that a study scores, step by step.
-
-How gymnasium comes to know of lane following, and what a user without gymnasium is told.
-"""
+"""Lane following as a Gymnasium environment: the episodes that a study scores, step by step."""
 
 import functools
 import subprocess

@@ -1,7 +1,4 @@
-"""What [domain] of an environment says is read strictly, and refused with file, key and remedy.
-
-Our effects round an environment: what they do to actions and observations, and that neutral ones do nothing.
-"""
+"""What [domain] of an environment says is read strictly, and our effects round it do what they say."""
 
 import numpy as np
 import pytest

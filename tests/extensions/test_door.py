@@ -1,7 +1,4 @@
-"""One door for a user's own code: found, kept apart by folder, usable in other processes, refused in one line.
-
-A user's modules go along to a process that cannot see their folder.
-"""
+"""One door for a user's own code: found, kept apart by folder, usable in other processes, refused in one line."""
 
 import importlib.util
 import os

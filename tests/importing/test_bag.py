@@ -1,8 +1,4 @@
-"""A bag is known by its files, lists its topics, and a damaged one is told in one line.
-
-Messages become rows of numbers, whatever type they have, and a bad one is told by its number.
-Header stamps count where they are dates; clocks that differ or drift are told.
-"""
+"""A bag is known by its files; its messages become rows of numbers, and a damaged one is told in one line."""
 
 import sys
 

@@ -1,7 +1,4 @@
-"""Pictures keep their pixels, whatever their encoding, and are read one at a time.
-
-Which pair of frames is the robot's pose, and the chain of transforms between two.
-"""
+"""Pictures keep their pixels, whatever their encoding, and transforms lead to the robot's pose."""
 
 from io import BytesIO
 

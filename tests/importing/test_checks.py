@@ -1,8 +1,4 @@
-"""Stamps are put in order and what was odd is said; what cannot be mended is refused with what to do.
-
-A unit that cannot be is told by import, before anything is written or fitted.
-The lag of measured behind commanded turning is found by cross-correlation, of either sign.
-"""
+"""Stamps are put in order, units and clocks are checked, and what cannot be mended is refused with what to do."""
 
 from dataclasses import replace
 

@@ -1,9 +1,4 @@
-"""A log is opened whatever form it comes in, and every form of one recording is the same log.
-
-The form of a source is told by what is in it, and a log has one kind of commands.
-A drive is told in numbers that are counted, and two clocks show in them.
-A log is written whole or not at all, and reads back as what was imported.
-"""
+"""Every form of one recording is the same log, written whole or not at all, and a drive is told in numbers."""
 
 import os
 from dataclasses import replace

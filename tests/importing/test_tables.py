@@ -1,8 +1,4 @@
-"""CSV files of others are read by their columns' names or a map, and every complaint says where and what to do.
-
-The MRCLAM data set's own files are read, one robot at a time.
-TUM trajectories are read with commands from a second file; without them only where that is asked for.
-"""
+"""CSV files of others, MRCLAM and TUM are read, and every complaint says where and what to do."""
 
 import numpy as np
 import pytest

@@ -1,8 +1,4 @@
-"""Which topic is taken follows from what is wanted, then from its name, type and number of messages.
-
-Poses out of transforms: chains are composed, what moves at other times is interpolated.
-A bag becomes drives: the same numbers from every storage, several bags as several drives.
-"""
+"""Which topic is taken, poses out of transforms, and the drives that a bag becomes, of whatever storage."""
 
 import sqlite3
 

@@ -1,7 +1,4 @@
-"""Behaviour cloning learns what pictures show, the same under the same seed, and goes on from other weights.
-
-So does the other learner, random features. What they see of a picture is the mean grey of its cells.
-"""
+"""Both learners learn what pictures show, the same under the same seed, and cloning goes on from other weights."""
 
 from dataclasses import replace
 

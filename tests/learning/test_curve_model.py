@@ -1,9 +1,4 @@
-"""Intervals of PLV hold the truth as often as they say, where examinations are chosen as where all are made.
-
-The process over learning curves follows the scores of all repetitions, and is as unsure as they are.
-A learning curve is scores over a rising grid of target samples, with gaps where nobody was examined.
-Drawn learning curves keep within bounds, rise where the data allow it, and cross where they come to stay above.
-"""
+"""Learning curves, their process, those drawn, and intervals of PLV that hold the truth as often as they say."""
 
 import numpy as np
 import pytest

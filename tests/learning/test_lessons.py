@@ -1,11 +1,4 @@
-"""What is in the cache is whole, is made once, and is told apart by all that determines it.
-
-Target samples cost what the expert's driving, the learner's and labels cost; PLV in cost is equation 6.
-Several episodes are examined at once where the classroom offers it, else one by one.
-What a learner has learnt is found again only by the same settings and the same code.
-Lessons give as many samples as asked for, from θ drawn as p(θ) says.
-Rehearsal adds so many of the proxy's samples as its share says, from all over its lessons.
-"""
+"""What lessons cost, and what of them is cached: made once, and told apart by all that determines it."""
 
 import contextlib
 import importlib

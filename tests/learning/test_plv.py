@@ -1,7 +1,4 @@
-"""PLV counts target samples where the mean curve crosses, and says where nothing was reached.
-
-Examinations go where they tell most about PLV, by a rule that only the known scores decide.
-"""
+"""PLV counts samples where the mean curve crosses, and examinations go where they tell most about it."""
 
 import numpy as np
 import pytest

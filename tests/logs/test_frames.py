@@ -1,7 +1,4 @@
-"""A log's frames are read with their drives and times, and every complaint says where and what to do.
-
-Pictures of any size and kind are read as red, green and blue, averaged down, one after another.
-"""
+"""A log's frames are read with their drives and times, and every complaint says where and what to do."""
 
 import numpy as np
 import pandas as pd

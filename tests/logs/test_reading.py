@@ -1,8 +1,4 @@
-"""Commands at times of their own are read as they were issued, and every complaint says where and what to do.
-
-Everything that is wrong with a log.toml is said at once, in one line.
-Logs are read strictly, laid on their grid of times, and every complaint says where and what to do.
-"""
+"""Logs are read strictly, laid on their grid of times, and every complaint says where and what to do."""
 
 import io
 import time

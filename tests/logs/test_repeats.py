@@ -1,7 +1,4 @@
-"""A pose that repeats while the robot moves is an older one shown again, is used once, and is told of in one line.
-
-A pose that repeats while it stands is its pose, whichever way it comes to stand and goes on.
-"""
+"""A pose that repeats while the robot moves is an older one shown again; while it stands it is its pose."""
 
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,4 @@
-"""What a loop cannot use is refused in one line before anything is driven.
-
-A step is done once for the same inputs, and one that was broken off counts as not done.
-"""
+"""What a loop cannot use is refused before anything is driven, and a step is done once for the same inputs."""
 
 import os
 

@@ -1,7 +1,4 @@
-"""Agents are compared by stated metrics.
-
-A table is built from finished episodes, and keeps values with their names.
-"""
+"""Agents are compared by stated metrics, in a table that keeps values with their names."""
 
 import numpy as np
 import pytest

@@ -1,7 +1,4 @@
-"""The likelihood is highest where the target was made, and outputs that say the same count as one.
-
-Outputs are modelled each on its own, where they are known, and their errors are told as large as they are.
-"""
+"""The likelihood is highest where the target was made, of outputs that are modelled with errors of their true size."""
 
 from dataclasses import replace
 

@@ -1,8 +1,4 @@
-"""Trials left out say how wide a region has to be.
-
-A proxy that fits is not said to lack anything, and one that lacks something is.
-The posterior over the box: its share, its intervals and its draws are those of densities that are known.
-"""
+"""The posterior over the box, the proxies that it finds lacking, and how wide a region has to be."""
 
 from dataclasses import replace
 

@@ -1,7 +1,4 @@
-"""A study's objective is a measure that it names: PRPV, PPV, or one of one's own; anything else is refused.
-
-The target's table as people have it: in several files, with names of its own.
-"""
+"""A study's objective and its target's table, as people have it; anything else is refused."""
 
 import re
 

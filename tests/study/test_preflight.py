@@ -1,7 +1,4 @@
-"""Noise is that of placement where both sides share their starts, and what is lost without is told.
-A family with one dead parameter, one that moves no more than noise does, and one that matters.
-An agent that comes to other scores in the same episode is named before the first trial.
-"""
+"""Noise is that of placement; dead parameters and agents that do not repeat are named before the first trial."""
 
 import json
 import random

@@ -1,7 +1,4 @@
-"""The answer is what fresh episodes confirm, never the luckiest trial.
-
-A study's trials as a search of any kind has them.
-"""
+"""The answer is what fresh episodes confirm, never the luckiest trial."""
 
 import shutil
 from dataclasses import replace

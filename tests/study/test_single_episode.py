@@ -1,7 +1,4 @@
-"""An episode in proxy and target: the same but for what the domains differ in.
-
-One episode to look at: what is kept of it, and what is no recording.
-"""
+"""One episode to look at, in proxy and target: the same but for what the domains differ in."""
 
 import numpy as np
 import pytest

@@ -1,7 +1,4 @@
-"""Several θ are tried together; what comes of it depends on how many, and on nothing else.
-
-Another budget or other jobs than study.toml says, and nothing else.
-"""
+"""Several θ are tried together; what comes of it depends on how many, and on nothing else."""
 
 import sqlite3
 from dataclasses import replace

@@ -1,10 +1,4 @@
-"""Two rankings agree as far as their draws do, and pairs count as contrary only where both orders are sure.
-
-The learning experiment finds which proxy teaches, goes on where it was left, and says what cannot be used.
-Each family teaches at its best θ, for one target; what they share is made once.
-The paper's observations are said to hold only where intervals show it.
-PRPV of a learning experiment's proxies: an interval for each, and θ drawn for each start where a proxy draws it.
-"""
+"""The learning experiment finds which proxy teaches, and says of its ranking only what intervals show."""
 
 from contextlib import nullcontext
 from dataclasses import replace

@@ -1,8 +1,4 @@
-"""What is cached of a learning experiment is found again only by what would make the very same.
-
-Who drives in lessons, in which rounds, and what each round depends on.
-Whatever code that is not ours does in a lesson, a training or an examination is told in one line that names it.
-"""
+"""Who drives in which lessons, what is found again in the cache, and what other people's code does wrong there."""
 
 import functools
 import re

@@ -1,7 +1,4 @@
-"""The finalists of a search by PLV are the best by all trials together, none twice, and are taught afresh.
-
-A study of learning value looks where asked, finds the proxy that teaches, and goes on where it was left.
-"""
+"""A search by PLV looks where asked, finds the proxy that teaches, and confirms its finalists afresh."""
 
 import re
 from dataclasses import replace

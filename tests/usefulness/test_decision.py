@@ -1,7 +1,4 @@
-"""Which agent to deploy: probabilities and regrets are those of the posterior, and what is not known is not told.
-
-The test after each rollout, and the plan of rollouts to come.
-"""
+"""Which agent to deploy, the test after each rollout, and the plan of those to come."""
 
 import numpy as np
 import pytest

@@ -1,7 +1,4 @@
-"""PRPV lies between chance and the noise floor, a domain against itself from the same starts; halves are called so.
-
-Success rates have intervals of their own, and ties are counted.
-"""
+"""PRPV lies between chance and the noise floor; success rates have intervals of their own."""
 
 from itertools import permutations
 from pathlib import Path

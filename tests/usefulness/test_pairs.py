@@ -1,8 +1,4 @@
-"""PRPV counts wrongly ordered pairs of the same agents, sorted or compared, and repeats of a start are no other starts.
-
-First what is compared; then sorting, to the last bit; PRPV by hand, by its properties and in the published pilot; last
-START/REPEAT for the bootstrap and for splits.
-"""
+"""PRPV counts wrongly ordered pairs of the same agents: by hand, by its properties and in the published pilot."""
 
 from pathlib import Path
 

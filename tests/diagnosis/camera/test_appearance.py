@@ -1,7 +1,4 @@
-"""Noise is told from the floor's texture where it can be, and is bounded where it cannot.
-
-Motion blur and defocus come out as they were put in, and are not taken for each other.
-"""
+"""Noise is told from the floor's texture, motion blur from defocus, and each comes out as it was put in."""
 
 import functools
 

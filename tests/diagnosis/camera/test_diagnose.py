@@ -1,8 +1,4 @@
-"""How often the diagnosis of a camera is right, on frames that another renderer drew of lanes laid by hand.
-
-Verdicts on planted cameras, from a log's files to the last line.
-How a map was laid is told: a line beside its place, wider lines, and a whole map that is off.
-"""
+"""Verdicts on planted cameras, from a log's files to the last line, on frames that another renderer drew."""
 
 import functools
 import tempfile

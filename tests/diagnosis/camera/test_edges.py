@@ -1,10 +1,4 @@
-"""Edges of markings are found to a tenth of a pixel, with the marking's side, and nowhere else.
-
-Where the robot was: smoothed where it moves, exact where it stands, left out where nobody knows.
-A camera in θ: its own effects set it, all others leave it alone, and parameters stay within their bounds.
-The tape's errors each have one place, and no scatter is trusted below its least.
-A log's frames become views: spread over the log, thinned, and refused where too few show markings.
-"""
+"""What a camera's fit is given: edges of markings, views of a log's frames, where the robot was, a camera in θ."""
 
 from dataclasses import replace
 from pathlib import Path

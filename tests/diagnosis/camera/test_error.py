@@ -1,7 +1,4 @@
-"""Before and after are compared on the same unseen frames, in pixels and in grey levels.
-
-Errors are those on frames that were not fitted, with an interval, and the same every time.
-"""
+"""Before and after are compared on the same unseen frames, in pixels and in grey levels, with an interval."""
 
 import functools
 from dataclasses import replace

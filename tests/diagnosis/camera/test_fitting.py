@@ -1,7 +1,4 @@
-"""Planted cameras come back within their own standard deviations, with tape, map and poses as nuisances.
-
-A tracker's scatter is learnt from what a fit adds to its poses.
-"""
+"""Planted cameras come back within their own standard deviations, with tape, map and poses as nuisances."""
 
 from dataclasses import replace
 

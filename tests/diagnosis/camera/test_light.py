@@ -1,7 +1,4 @@
-"""Dirt and a bumper are found where they are; a floor's own texture, lights and tape are no blemishes.
-
-Exposure and vignetting come out as they were put in, and paint that nobody knows is not blamed on the lens.
-"""
+"""Dirt, a bumper, exposure and vignetting come out as they were put in; the floor's own look is no blemish."""
 
 import functools
 

@@ -1,7 +1,4 @@
-"""Pictures of a model are those of its camera, and each effect changes them as it should.
-
-Residuals vanish at the truth, and every slope agrees with finite differences.
-"""
+"""A model's pictures are those of its camera, and the slopes of its residuals those of finite differences."""
 
 import functools
 from dataclasses import replace

@@ -1,10 +1,4 @@
-"""Frames that do not belong to their poses are refused in one line that names the mistake.
-
-What leaving effects out costs is what refitting would cost, for the sets that a caller may choose.
-The gate is closed for the right camera, and for tape beside its place, and open for a lens that nobody has.
-Planted effects are named, alone and in pairs, and nothing is named of a nominal camera.
-What frames cannot show is said, and what to take to see it.
-"""
+"""Planted effects of a camera are named and no others, by what leaving out costs; what frames cannot show is said."""
 
 from dataclasses import replace
 from types import SimpleNamespace

@@ -1,9 +1,4 @@
-"""Clocks that are apart are told and put right; clocks that are not are left alone.
-
-Long rests are cut out of drives; what is driven stays as it was.
-Drives are kept aside to test on, and blocks never reach over them.
-Long drives are made short, in the same blocks, without a pose that was not measured.
-"""
+"""Clocks that are apart are told and put right, rests cut out, drives kept aside to test on, long ones shortened."""
 
 from dataclasses import replace
 

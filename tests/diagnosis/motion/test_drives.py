@@ -1,9 +1,4 @@
-"""Cosine and sine from the tangent of half the angle are those of numpy.
-
-Measured drives become arrays: what counts as an increment, and what a command is as a duty.
-What was asked for lately is not worked out again.
-A log's robot is one of ours, or what its log says of it.
-"""
+"""Measured drives become arrays: increments, duties, and the robot that they are of."""
 
 from dataclasses import replace
 

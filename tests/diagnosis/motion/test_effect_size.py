@@ -1,8 +1,4 @@
-"""Drives of two robots fall in two groups; drives of one do not, whatever it lacks.
-
-Effects are kept for what they are worth in error of prediction, not for their evidence.
-What drives could not have shown: a full-speed limit in slow drives, say.
-"""
+"""What effects are worth in error of prediction, what drives could not have shown, and drives of two robots."""
 
 from dataclasses import replace
 

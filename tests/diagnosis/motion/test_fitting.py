@@ -1,7 +1,4 @@
-"""Parameters are found with honest intervals, and blocks are foretold as if they had been left out.
-
-Logs that cannot bear the question are refused with what is wrong; honest logs are not.
-"""
+"""Parameters are found with honest intervals, and logs that cannot bear the question are refused."""
 
 from dataclasses import replace
 

@@ -1,8 +1,4 @@
-"""The whitener is the factor of the errors' covariance, and noise is found from them.
-
-What a model says of recorded commands: paths, their increments, and windows that start from measured states.
-A diagnosis walks as the planar plant does.
-"""
+"""The whitener is the factor of the errors' covariance, and a model's increments walk as the planar plant does."""
 
 from dataclasses import replace
 

@@ -1,7 +1,4 @@
-"""The noise of measured poses is told from the logs alone, and what it makes of windows.
-
-Parameters are fitted to windows, and only where windows that were left out are no worse.
-"""
+"""Parameters are fitted to windows, by the noise that logs tell, only where windows left out are no worse."""
 
 from dataclasses import replace
 

@@ -1,9 +1,4 @@
-"""What a model says of a log, window by window.
-
-What drives from the same commands do not repeat is noise; what they do, a model could predict.
-How weights move windows is what replays with other weights show.
-Windows cover unbroken poses and are of the stated horizon; errors come with honest intervals.
-"""
+"""What a model says of a log, window by window, and what drives from the same commands do not repeat."""
 
 from dataclasses import replace
 

@@ -1,7 +1,4 @@
-"""Lost and jittering commands are found, and clean drives have none.
-
-The size of a random effect, and an interval that holds it.
-"""
+"""Lost and jittering commands are found with their sizes, and clean drives have none."""
 
 from dataclasses import replace
 

@@ -1,8 +1,4 @@
-"""Every motion effect can be asked for, in forms that the catalogue accepts.
-
-A step of the command is found however small the spike is that it leaves, and a slippery place wherever it lies.
-The effect that is there leads, chance is told as chance, and left and right are treated alike.
-"""
+"""Every motion effect can be asked for; the one that is there leads, and chance is told as chance."""
 
 import functools
 from dataclasses import replace

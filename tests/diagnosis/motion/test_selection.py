@@ -1,11 +1,4 @@
-"""An effect is adopted with its rivals, and what no longer pays beside it is dropped.
-
-Of what was looked at, what has most evidence is chosen, unless it stands for something else.
-What was chosen beside an effect that does harm is searched for again without it.
-Named effects and curves are weighed against each other by one measure of evidence.
-The search adds effects one at a time, as long as each has evidence enough and no signal says far more.
-Effects of a car that hide one another are found together, where the search leaves much over.
-"""
+"""Effects are adopted one at a time, each for its evidence beside its rivals, and dropped where they no longer pay."""
 
 from dataclasses import replace
 from types import SimpleNamespace

@@ -252,12 +252,12 @@ def curve_of(run: StudyRun, sweep: SweepRecord) -> SweepCurve | None:
     return SweepCurve(sweep.parameter, unit, sweep.base, metrics, tuple(points), bool(sweep.replays))
 
 
-def pod_mean(values: Sequence[float], *, seed: int = 0) -> PodMean:
+def pod_mean(values: Sequence[float]) -> PodMean:
     """Average a POD over starts, with the percentile bootstrap interval of the mean."""
     found = np.asarray(values, dtype=np.float64)
     if len(found) < 2:
         return PodMean(float(found.mean()), None, len(found))
-    draws = np.random.default_rng(seed).integers(len(found), size=(RESAMPLES, len(found)))
+    draws = np.random.default_rng(0).integers(len(found), size=(RESAMPLES, len(found)))
     return PodMean(float(found.mean()), usefulness.interval(found[draws].mean(axis=1)), len(found))
 
 

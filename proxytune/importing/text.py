@@ -103,14 +103,14 @@ def read_text_table(path: Path, names: Sequence[str] = ()) -> Table:
     return Table(path, table)
 
 
-def first_rows(path: Path, count: int = 4) -> list[list[str]]:
-    """The first rows of a file that are no comments, split into cells; none where it is not text."""
+def first_rows(path: Path) -> list[list[str]]:
+    """The first four rows of a file that are no comments, split into cells; none where it is not text."""
     try:
         with path.open("rb") as file:
             text = codecs.getincrementaldecoder("utf-8-sig")().decode(file.read(HEAD_BYTES))
         _, lines = _split_comments(text)
         separator = _separator(lines[0][1]) if lines else ""
-        return [_cells(path, number, line, separator) for number, line in lines[:count]]
+        return [_cells(path, number, line, separator) for number, line in lines[:4]]
     except (OSError, UnicodeDecodeError, LogError):
         return []
 

@@ -236,7 +236,7 @@ class CurveDraws:
 
 
 def draw_curves(
-    curves: Mapping[str, LearningCurve], bounds: tuple[float, float], draws: int = POSTERIOR_DRAWS, seed: int = 0
+    curves: Mapping[str, LearningCurve], bounds: tuple[float, float], draws: int = POSTERIOR_DRAWS
 ) -> CurveDraws:
     """Draw the mean curves, within bounds, that the examinations allow: a pure function of these."""
     first = float(min(curve.counts[1] for curve in curves.values()))
@@ -245,7 +245,7 @@ def draw_curves(
     model = fit_curve_model(_marks(curves, first))
     which = np.repeat(np.arange(len(curves)), len(place))
     mean, covariance = model.mean_curves(which, np.tile(place, len(curves)))
-    normal = np.random.default_rng(seed).standard_normal((draws, len(mean)))
+    normal = np.random.default_rng(0).standard_normal((draws, len(mean)))
     # A matrix whose product with its transpose is the covariance, even one that rounding has made indefinite
     values, vectors = np.linalg.eigh(covariance)
     root = np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)))

@@ -80,13 +80,13 @@ def squared_radius(rows: int, columns: int) -> Floats:
     return np.asarray((across**2 + down[:, None] ** 2) / (columns**2 / 4.0 + rows**2 / 4.0))
 
 
-def flat_places(predicted: NDArray[Any], floor: Flags, margin: int = MARGIN) -> NDArray[np.int8]:
+def flat_places(predicted: NDArray[Any], floor: Flags) -> NDArray[np.int8]:
     """The number in PAINTS that a pixel (N, rows, columns) shows with its neighbours; −1 near edges and off floor."""
     paint = np.full(predicted.shape[:3], -1, dtype=np.int8)
     for number, colour in enumerate(PAINTS):
         paint[(np.abs(predicted - colour.astype(np.float32)) < 2.0).all(axis=-1)] = number
     paint[:, ~floor] = -2
-    around = (1, 2 * margin + 1, 2 * margin + 1)
+    around = (1, 2 * MARGIN + 1, 2 * MARGIN + 1)
     alike = minimum_filter(paint, around) == maximum_filter(paint, around)
     return np.where(alike & (paint >= 0), paint, np.int8(-1))
 

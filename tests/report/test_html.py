@@ -103,11 +103,11 @@ def test_no_text_breaks_the_page(text):
 
 
 def test_headings_and_contents_come_in_order_and_tables_have_scopes_captions_and_regions_for_the_keyboard():
-    tags = [tag for tag, _ in Reader(html_of(VIEW)).elements if re.fullmatch(r"h\d", tag)]
+    elements = Reader(html_of(VIEW))
+    tags = [tag for tag, _ in elements.elements if re.fullmatch(r"h\d", tag)]
     assert tags[0] == "h1"
     assert tags.count("h1") == 1
     assert set(tags[1:]) == {"h2"}
-    elements = Reader(html_of(VIEW))
     assert {attrs.get("scope") for attrs in elements.all("th")} == {"row", "col"}
     assert len(elements.all("caption")) == len(elements.all("table")) == 2
     regions = [attrs for attrs in elements.all("div") if attrs.get("class") == "scroll"]

@@ -139,7 +139,6 @@ def test_one_long_drive_or_several_that_begin_at_the_origin_with_stubs_among_the
     found = diagnose(planted_log(SCRUBBING, episodes=1, seconds=70.0), ROBOT, ("trim", "delay"))
     assert [effect.effect for effect in found.effects] == ["yaw_scrub"]
     assert found.robot_clusters is None
-    look_for_few(monkeypatch)
     drives = planted_log(SCRUBBING, episodes=6, seconds=12.0).episodes
     at_origin = driven_log(SCRUBBING, np.stack([e.commands for e in drives]), np.zeros((6, 3)))
     stubs = [replace(e, name=2 * e.name, times=e.times[:3], commands=e.commands[:3], poses=e.poses[:3]) for e in drives]

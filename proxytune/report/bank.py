@@ -26,6 +26,10 @@ def bank_sentence(bank: Bank) -> str:
     told = [f"{plain(name)} to ± {short(width / 2.0)} {bank.units[name]}".rstrip() for name, width in widths.items()]
     best = [name for name, _ in bank.agents[:MOST_NAMED]]
     from_starts = f"{len(bank.settings.agents)} agents measured from {bank.settings.starts} starts"
+    if not best and bank.failed:
+        worst = max(bank.failed, key=bank.failed.__getitem__)
+        failed = f"{worst} failed from every start in {bank.failed[worst]} of {bank.trials} trials"
+        return f"{failed}, too many to say what {from_starts} would tell; mend it, or leave it out of agents."
     if not best:
         return f"{bank.trials} trials are too few to say what {from_starts} would tell; raise budget."
     by_starts = [bank.widths(count) for count in bank.expected]

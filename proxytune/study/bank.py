@@ -33,6 +33,7 @@ class Bank:
     expected: Mapping[int, Expected]  # what a target measured from some first starts will tell, by their number
     needed: Mapping[str, int | None]  # how many starts tell each parameter to `WITHIN`; None where all do not
     units: Mapping[str, str]  # the parameters' units by their names; "" where one has none
+    failed: Mapping[str, int]  # in how many trials an agent failed from every start, where in any
 
     def widths(self, starts: int) -> dict[str, float]:
         """Mean width of each parameter's 95 % interval, by a target that is measured from so many starts."""
@@ -42,8 +43,8 @@ class Bank:
     @property
     def agents(self) -> tuple[tuple[str, float], ...]:
         """The agents with their mean shares in what is told of all parameters, the most telling first."""
-        told = self.expected[self.settings.starts].information
-        shares = {name: np.mean([dict(one.agents)[name] for one in told]) for name in self.settings.agents if told}
+        told = [dict(one.agents) for one in self.expected[self.settings.starts].information]
+        shares = {name: np.mean([one.get(name, 0.0) for one in told]) for name in self.settings.agents if told}
         return tuple(sorted(((name, float(share)) for name, share in shares.items()), key=lambda pair: -pair[1]))
 
 
@@ -85,7 +86,10 @@ def bank_of(run: StudyRun) -> Bank:
     ]
     needed = dict(zip(settings.space.names, reach, strict=True))
     units = {name: run.study.family.parameters[name].unit for name in settings.space.names}
-    return Bank(settings, len(records), expected, needed, units)
+    worked = [{one.episode.agent for one in each if one.metrics is not None} for each in driven]
+    failed = {name: sum(name not in agents for agents in worked) for name in settings.agents}
+    failed = {name: trials for name, trials in failed.items() if trials}
+    return Bank(settings, len(records), expected, needed, units, failed)
 
 
 def _starts_needed(reach: Mapping[int, float], most: int) -> int | None:

@@ -8,6 +8,7 @@ from types import SimpleNamespace
 
 import pytest
 from one_line import complaint_of
+from wobbly import Wobbly
 
 from proxytune.api import read_study, run_study
 from proxytune.cli.main import main
@@ -54,11 +55,24 @@ def test_a_bank_says_where_more_starts_seem_to_tell_less():
     def sentence(later):
         known = {1: {"trim": 0.08}, 3: {"trim": later}}
         settings = SimpleNamespace(starts=3, agents=("one",))
-        facts = {"widths": known.get, "expected": known, "units": {"trim": ""}, "agents": [("one", 1.0)], "trials": 12}
-        return bank_sentence(SimpleNamespace(**facts, settings=settings))
+        facts = {"widths": known.get, "expected": known, "units": {"trim": ""}, "agents": [("one", 1.0)], "failed": {}}
+        return bank_sentence(SimpleNamespace(**facts, trials=12, settings=settings))
 
     assert sentence(0.083).endswith("one tell most.")
     assert sentence(0.09).endswith("More starts seem to tell less of trim: widths are known roughly; raise budget.")
+
+
+def test_a_bank_answers_though_an_agent_always_scores_the_same(make_study, answered, monkeypatch):
+    own, alike = Wobbly.run, {"distance": 1.0, "survival_time": 5.0}
+    monkeypatch.setattr(Wobbly, "run", lambda self, one: alike if one.agent == "agent3" else own(self, one))
+    found = answered("study", make_study(**BANK))
+    assert found["sentence"].startswith("10 trials: 6 agents measured from 3 starts tell delay to")
+    assert found["bank"]["agents"][-1] == "agent3"
+
+
+def test_a_bank_names_the_agent_whose_failures_leave_it_without_an_answer(make_study, answered):
+    found = answered("study", make_study(**BANK, domain={"faults": "['agent3:*:raises']"}))
+    assert found["sentence"].startswith("agent3 failed from every start in 10 of 10 trials, too many to say what 6")
 
 
 @pytest.fixture(scope="module")

@@ -15,6 +15,7 @@ import tomlkit
 
 from proxytune.api import DiagnosisReport, Wanted, recordable
 from proxytune.diagnosis import camera_effects, diagnose_log, film, forget_stages, motion_effects, robot_of
+from proxytune.driving import robot_home
 from proxytune.effects import Catalogue, effect_of
 from proxytune.errors import RunError, SettingsError, StoreError
 from proxytune.extensions import describe
@@ -107,7 +108,14 @@ def extension_text(settings: StudySettings, model: Path, folder: Path) -> str:
     values["target"] = targets if len(targets) > 1 else targets[0]
     if settings.truth:
         values["truth"] = _from(folder, settings.truth)
+    # Trials of earlier studies are of the proxy without what was found.
+    values.pop("learn_from", None)
+    if settings.low_fidelity:
+        named = [(name, settings.folder / name) for name in settings.low_fidelity]
+        values["low_fidelity"] = [_from(folder, path) if path.exists() else name for name, path in named]
     domain = {key: value for key, value in settings.domain.items() if key != "effects"}
+    if Path(road := settings.domain.text("map", "")).parent.name:
+        domain["map"] = _from(folder, settings.folder / road)
     found = read_settings(model).section("effects").keys()
     # What the study's own proxy has beside what was diagnosed stays.
     proxy = read_settings(settings.proxy).section("effects").values if settings.proxy else {}
@@ -117,12 +125,12 @@ def extension_text(settings: StudySettings, model: Path, folder: Path) -> str:
     return f"# {settings.name} with what `diagnose` found, written by `loop`.\n" + tomlkit.dumps(values)
 
 
-def write_extension(settings: StudySettings, model: Path, folder: Path) -> None:
+def write_extension(settings: StudySettings, robot: str, model: Path, folder: Path) -> None:
     """Write the extended study, with the study's own modules, robots, maps and weights beside it."""
     # Without study.toml its modules would count as the study's own.
     write_text(folder / FILE_NAME, extension_text(settings, model, folder))
     try:
-        for path in files_of(settings):
+        for path in files_of(settings, robot):
             if path.is_dir():
                 shutil.copytree(path, folder / path.name, ignore=_ignored, dirs_exist_ok=True)
             else:
@@ -131,10 +139,12 @@ def write_extension(settings: StudySettings, model: Path, folder: Path) -> None:
         raise StoreError(f"{folder}: cannot be written ({problem}); make room and run again") from None
 
 
-def files_of(settings: StudySettings) -> list[Path]:
-    """The files and folders beside study.toml that a study may read."""
+def files_of(settings: StudySettings, robot: str) -> list[Path]:
+    """The files and folders beside study.toml that a study may read, and its robot if that lies beside the study."""
     names = [path.name for path in settings.folder.iterdir() if path not in settings.targets]
-    return [settings.folder / name for name in sorted({*names} - _ignored(str(settings.folder), names))]
+    own = [settings.folder / name for name in sorted({*names} - _ignored(str(settings.folder), names))]
+    home = robot_home(robot, settings.folder)
+    return [*own, home] if home.parent == settings.folder.resolve().parent else own
 
 
 def begin_anew_if_changed(study: Study) -> None:

@@ -140,6 +140,9 @@ def open_loop(path: Path, twin: Path | None = None, log: Path | None = None) -> 
         raise settings.error("families", "`loop` is of one family; give it a study without this table")
     if settings.objective == study.LEARNING:
         raise settings.error("objective", "`loop` tunes by scores; give it a study with another objective than 'plv'")
+    if not settings.budget:
+        nothing = "is 0, and of the proxy with what is found nothing is known without a trial; make it 1 or more"
+        raise settings.error("budget", nothing)
     family = study.load_family(settings, settings.proxy)
     robot = getattr(family, "robot", None)
     if not isinstance(robot, str):

@@ -138,11 +138,11 @@ class _Closing:
     def _extend(self) -> Study:
         settings, home = self.settings, self.loop.home
         folder, model = home / "extended", home / "diagnosed" / "model.toml"
-        files = [(path.name, opening.digest_of_files(path)) for path in diagnosing.files_of(settings)]
+        files = [(path.name, opening.digest_of_files(path)) for path in diagnosing.files_of(settings, self.loop.robot)]
         inputs = opening.digest(
             "extension", diagnosing.extension_text(settings, model, folder), opening.digest_of_files(model), files
         )
-        do = partial(diagnosing.write_extension, settings, model, folder)
+        do = partial(diagnosing.write_extension, settings, self.loop.robot, model, folder)
         self._keep("extension", inputs, folder / FILE_NAME, do)
         study = open_study(folder)
         diagnosing.begin_anew_if_changed(study)

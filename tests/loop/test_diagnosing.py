@@ -1,5 +1,6 @@
 """The extended study is the study itself, by another proxy, from another folder; a killed diagnosis goes on."""
 
+import shutil
 from contextlib import nullcontext
 
 import pytest
@@ -8,6 +9,8 @@ from stopping import Killed
 from tiny_loop import FOUND, write_diagnosis, write_tiny
 
 from proxytune.diagnosis.stages import Stages
+from proxytune.driving import read_map
+from proxytune.files import shipped
 from proxytune.loop import diagnosing
 from proxytune.loop.diagnosing import diagnose_target, write_extension
 from proxytune.loop.opening import open_loop
@@ -18,7 +21,7 @@ def extended(tmp_path, *changes):
     study = write_tiny(tmp_path / "tiny", *changes)
     (study / "found.toml").write_text(FOUND)
     settings = read_study_settings(study)
-    write_extension(settings, study / "found.toml", study / "loop" / "extended")
+    write_extension(settings, "duckiebot", study / "found.toml", study / "loop" / "extended")
     return settings, read_study_settings(study / "loop" / "extended")
 
 
@@ -50,6 +53,23 @@ def test_what_a_study_may_read_lies_beside_the_extended_one_and_what_runs_made_d
     extended(tmp_path)
     there = {path.relative_to(folder / "loop" / "extended").as_posix() for path in (folder / "loop").rglob("*.*")}
     assert there == {"study.toml", "twin.toml", "found.toml", "mine.py", "robby/robot.toml"}
+
+
+def test_a_robot_a_map_and_a_cheaper_proxy_beside_the_study_are_still_found(tmp_path):
+    shutil.copytree(shipped("robots") / "duckiebot", tmp_path / "robby")
+    shutil.copy(shipped("robots") / "maps" / "small_loop.toml", tmp_path / "yard.toml")
+    (tmp_path / "bank").mkdir()
+    path = tmp_path / "robby" / "robot.toml"
+    path.write_text(path.read_text().replace('"duckiebot"', '"robby"', 1))
+    domain = ('robot = "duckiebot"', 'robot = "robby"\nmap = "../yard.toml"')
+    known = ("budget", 'learn_from = ["../bank"]\nlow_fidelity = ["../bank"]\nbudget')
+    study = write_tiny(tmp_path / "tiny", domain, known)
+    (study / "found.toml").write_text(FOUND.replace("duckiebot", "robby"))
+    folder = study / "loop" / "extended"
+    write_extension(read_study_settings(study), "robby", study / "found.toml", folder)
+    after = read_study_settings(folder)
+    assert load_family(after, after.proxy).map == read_map(tmp_path / "yard.toml")
+    assert (after.learn_from, after.low_fidelity) == ((), ("../../../bank",))
 
 
 class Quiet:

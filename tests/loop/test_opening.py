@@ -52,6 +52,9 @@ REFUSED = {
     "a search for learning value": (
         (('name = "tiny"', 'name = "tiny"\nobjective = "plv"'),), {}, "", "objective: `loop` tunes by scores",
     ),
+    "no trials": (
+        (("budget = 4", 'learn_from = ["../bank"]\nbudget = 0'),), {}, "", "budget: is 0, and of the proxy with what is",
+    ),
     "a folder that cannot be made": ((), {"loop": "a file"}, "", "loop is no folder; move that away"),
 }  # fmt: skip
 """Changes of the study, files in its folder, words of the command, and what it says."""

@@ -53,7 +53,7 @@ REFUSED = {
         (('name = "tiny"', 'name = "tiny"\nobjective = "plv"'),), {}, "", "objective: `loop` tunes by scores",
     ),
     "no trials": (
-        (("budget = 4", 'learn_from = ["../bank"]\nbudget = 0'),), {}, "", "budget: is 0, and of the proxy with what is",
+        (("budget = 4", 'learn_from = ["../bank"]\nbudget = 0'),), {}, "", "budget: is 0, and of the proxy with what",
     ),
     "a folder that cannot be made": ((), {"loop": "a file"}, "", "loop is no folder; move that away"),
 }  # fmt: skip

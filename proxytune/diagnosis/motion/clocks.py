@@ -100,8 +100,8 @@ def read_clocks(log: Log, robot: Robot, like: Clocks | None = None, model: Theta
     """Measure the latency of every drive of a log; where it is not what is left of a log it is like, clocks differ.
 
     Latencies are those of a robot of first order. One that is slow in another way answers later to some commands than
-    to others, as if clocks jumped: with the θ of a `model` that leaves less of the speeds, clocks of single drives are
-    told only as they are beside its motion.
+    to others, as if clocks jumped or drifted: with the θ of a `model` that leaves less of the speeds, a drift is told
+    only if its motion shows it too, and clocks of single drives only as they are beside it.
     """
     drives = gather(log, robot, log.episodes, compared=False)
     speeds = latency.measured_speeds(drives) if len(drives.first) else None
@@ -109,17 +109,7 @@ def read_clocks(log: Log, robot: Robot, like: Clocks | None = None, model: Theta
         # Drives too short to tell are taken to have one clock.
         kept_s, later_s = np.tile((0.0, np.inf), (len(log.episodes), 1)), np.zeros(len(log.episodes))
         return Clocks(NONE, NONE, ASSUMED_DELAY_S, {}, (), later_s, kept_s, log.clock_offset_s)
-    squares, latencies, best, apart = _squares_by_reaction(log, drives, speeds)
-    begin = np.array([episode.times[0] for episode in log.episodes])
-    drift = NONE
-    for _ in range(DRIFT_PASSES):
-        times = begin[squares.episode] + (squares.number + 0.5) * latency.LATENCY_BLOCK_S
-        more = latency.clock_drift(squares, times, latencies)
-        if more is None or not (drift.value or more.is_sure):
-            break
-        drift = _offset(latency.Latency(drift.value + more.rate, more.deviation), 0.0)
-        log = without_drift(log, more.rate)
-        squares, latencies, best, apart = _squares_by_reaction(log, gather(log, robot, log.episodes), speeds)
+    log, drift, (squares, latencies, best, apart) = _read_drift(log, robot, drives, speeds, model)
     kept, jumps, common, others = _single_clocks(log, squares, latencies)
     if model is not None and (jumps or others):
         beside = _squares_by_model(log, robot, speeds, latencies, model, float(best.squares.mean()))
@@ -150,6 +140,36 @@ def read_clocks(log: Log, robot: Robot, like: Clocks | None = None, model: Theta
         declared_s=log.clock_offset_s,
         drift=drift,
     )
+
+
+_Squares = tuple[latency.Blocks, Floats, latency.Reaction, bool]
+
+
+def _read_drift(
+    log: Log, robot: Robot, drives: Drives, speeds: latency.Speeds, model: Theta | None
+) -> tuple[Log, Offset, _Squares]:
+    """The log without a drift of clocks, that drift, and what `_squares_by_reaction` then gives."""
+    begin = np.array([episode.times[0] for episode in log.episodes])
+
+    def drift_of(blocks: latency.Blocks, latencies: Floats) -> latency.Drift | None:
+        times = begin[blocks.episode] + (blocks.number + 0.5) * latency.LATENCY_BLOCK_S
+        return latency.clock_drift(blocks, times, latencies)
+
+    given = _squares_by_reaction(log, drives, speeds)
+    corrected, drift, found = log, NONE, given
+    for _ in range(DRIFT_PASSES):
+        more = drift_of(*found[:2])
+        if more is None or not (drift.value or more.is_sure):
+            break
+        drift = _offset(latency.Latency(drift.value + more.rate, more.deviation), 0.0)
+        corrected = without_drift(corrected, more.rate)
+        found = _squares_by_reaction(corrected, gather(corrected, robot, corrected.episodes), speeds)
+    if model is not None and drift.value:
+        _, latencies, best, _ = given
+        beside = _squares_by_model(log, robot, speeds, latencies, model, float(best.squares.mean()))
+        if beside is not None and not ((more := drift_of(beside, latencies)) and more.is_sure):
+            return log, NONE, given
+    return corrected, drift, found
 
 
 def put_on_one_clock(log: Log, clocks: Clocks) -> Log:

@@ -273,10 +273,11 @@ def diagnose(
     report("fitting what is declared")
     declared_alone = keep("declared", lambda: fit_declared(parts.fitted, start, names))
     selected = keep("selected", lambda: select_effects(declared_alone, seed, report))
-    if unread and any(one.odd for one in clocks):
+    if unread and any(one.odd or one.drift.value for one in clocks):
         log_again, test_again, again = _on_one_clock(*given, robot, selected.model.theta)
-        if any(one.odd - other.odd for one, other in zip(clocks, again, strict=True)):
-            report("clocks are read again beside this model, which moves as if they jumped")
+        pairs = list(zip(clocks, again, strict=True))
+        if any(one.odd - other.odd or (one.drift.value and not other.drift.value) for one, other in pairs):
+            report("clocks are read again beside this model, which moves as if they jumped or drifted")
             return diagnose(
                 log_again,
                 robot,

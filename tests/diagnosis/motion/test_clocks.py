@@ -13,7 +13,7 @@ from proxytune.diagnosis import cut, increments, robot_of
 from proxytune.diagnosis.motion import clocks as timing
 from proxytune.diagnosis.motion.clocks import cut_into_blocks, cut_out_long_rests, read_clocks, split, thin
 from proxytune.diagnosis.motion.drives import gather
-from proxytune.diagnosis.motion.latency import Blocks, _steps, stretches
+from proxytune.diagnosis.motion.latency import Blocks, Drift, _steps, stretches
 from proxytune.errors import LogError
 from proxytune.logs import Log, LogEpisode, Measured, read_log
 
@@ -146,6 +146,21 @@ def test_drift_is_one_line_through_drives_and_none_of_one_drive_that_grows_late(
     log = timing.without_drift(hidden.make_log(CASE, late_s=rate * DRIFTING, **SHORT), rate)
     np.testing.assert_allclose(log.episodes[0].issued, (1.0 + rate) * log.episodes[0].times)
     assert not read_clocks(log, ROBOT).differ
+
+
+def test_a_drift_that_a_model_explains_is_none_and_a_true_one_stays_beside_the_model(monkeypatch):
+    model = {**TRUTH, "dead_band.width": 0.2}
+    log = planted_log(model, episodes=6, seconds=40.0)
+    without = read_clocks(log, ROBOT, model=model)
+    drifting = timing.without_drift(log, -0.003)
+    assert read_clocks(drifting, ROBOT, model=model).drift == read_clocks(drifting, ROBOT).drift
+    assert read_clocks(drifting, ROBOT).drift.value == pytest.approx(0.003, abs=5e-4)
+    # As a robot of first order shows it, then what is left of it, then as the model does.
+    for model_given, value in ((None, 0.003), (model, 0.0)):
+        shown = iter((Drift(0.003, 0.0003, 40.0), None, Drift(0.0004, 0.0003, 40.0)))
+        monkeypatch.setattr("proxytune.diagnosis.motion.latency.clock_drift", lambda *_, of=shown: next(of))
+        found = read_clocks(log, ROBOT, model=model_given)
+        assert (found.drift.value, found.latency == without.latency) == (value, not value)
 
 
 @pytest.mark.parametrize(

@@ -165,7 +165,10 @@ def compose_of(study: Study) -> Compose:
 
     def compose(outputs: Floats) -> Floats:
         means = outputs.reshape(*outputs.shape[:-1], *table.means.shape)
-        return objective.sign * objective.of_means(means[..., : len(metrics)], compared, metrics)
+        scores = objective.sign * objective.of_means(means[..., : len(metrics)], compared, metrics)
+        finite = np.isfinite(scores)
+        # Where a user's measure is undefined, no θ is better than the worst.
+        return scores if finite.all() else np.where(finite, scores, scores.max(where=finite, initial=0.0))
 
     return compose
 

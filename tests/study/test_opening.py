@@ -13,6 +13,7 @@ from proxytune.storage import Store
 from proxytune.study import PRPV, StudyRun, open_study, result_of, study_facts
 from proxytune.study.answer import run_confirmation
 from proxytune.study.facts import changes
+from proxytune.study.study_run import compose_of
 
 OWN = """
 import numpy as np
@@ -51,6 +52,15 @@ def test_a_measure_of_one_s_own_is_made_large_and_kept_with_every_trial(own, eng
             assert value == -np.abs(proxy.select(target.metrics[:2]).means - target.means).max()
     assert max(values[5:]) > max(values[:5]), "the search gets nearer than its design"
     assert all(set(trial.measures) == {"mine:NEARNESS", "prpv", "ppv"} for trial in result.trials)
+
+
+def test_where_a_measure_of_one_s_own_is_undefined_no_theta_is_better_than_the_worst(own):
+    folder = own(confirm="1", engine='"outcomes"', budget="6")
+    distance = "np.abs(proxy - target).max(axis=(-2, -1))"
+    (folder / "mine.py").write_text(OWN.replace(f"-{distance}", f"np.where({distance} < 0.5, np.nan, -{distance})"))
+    study = run(folder).study
+    means = study.target.means.ravel()
+    assert compose_of(study)(np.stack([means, means + 1.0, means + 2.0])).tolist() == pytest.approx([2.0, 1.0, 2.0])
 
 
 @pytest.mark.slow

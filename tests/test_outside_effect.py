@@ -9,6 +9,8 @@ import pytest
 from one_line import complaint_of
 from planted import ROBOT
 
+from proxytune.diagnosis.log_diagnosis import _say_untried
+from proxytune.diagnosis.motion.diagnose import declared_parameters
 from proxytune.diagnosis.motion.screening import motion_effects
 from proxytune.driving import lane_following
 from proxytune.effects import Catalogue, Model, effect_of, effects_from, model_text, read_model
@@ -200,3 +202,14 @@ def test_a_plugin_s_effect_takes_part_by_itself_and_is_listed(installed, folder,
     assert "[effects.slow_back]" in model_text(model, catalogue=catalogue)
     (row,) = [row for row in answered("list", "effects")["effects"] if row["effect"] == "slow_back"]
     assert (row["parameter"], row["stage"], row["high"]) == ("slow_back", "motion", 0.9)
+
+
+def test_an_effect_without_a_trace_is_said_to_be_untried_and_cannot_be_declared(folder):
+    path = folder / "weak_reverse.py"
+    begin, end = WEAK_REVERSE.index("Trace(\n"), WEAK_REVERSE.index("    def begin")
+    path.write_text(f"{WEAK_REVERSE[:begin]}None\n\n{WEAK_REVERSE[end:]}")
+    catalogue = Catalogue(folder, (NAME,))
+    assert list(_say_untried(Catalogue())) == []
+    (said,) = _say_untried(catalogue)
+    assert said.startswith(f"effect '{NAME}' has no trace")
+    assert f"--declared {NAME}: has no trace" in complaint_of(declared_parameters, (NAME,), catalogue)

@@ -22,7 +22,7 @@ from proxytune.diagnosis.motion.diagnose import Diagnosis, declared_effects, dia
 from proxytune.diagnosis.motion.excitation import LIMITS, Limits
 from proxytune.diagnosis.motion.screening import motion_effects
 from proxytune.driving import Markings, Robot, ground_points
-from proxytune.effects import effect_of
+from proxytune.effects import Catalogue, effect_of
 from proxytune.errors import LogError, SettingsError
 from proxytune.logs import Frames, Log, log_cautions, read_pictures
 from proxytune.settings import nearest
@@ -79,7 +79,7 @@ def diagnose_log(
         diagnose, log, robot, on_motion, test=test, seed=seed, report=report, rules=rules, limits=limits, folder=folder
     )
     camera = partial(diagnose_camera, log, robot, on_camera, seed=seed, report=report, folder=folder)
-    cautions = log_cautions(log, robot.figures)
+    cautions = (*log_cautions(log, robot.figures), *_say_untried(robot.catalogue))
     if log.frames is None:
         return LogDiagnosis(log.name, robot, motion(), None, cautions=cautions)
     if log.command == "none":
@@ -91,6 +91,14 @@ def diagnose_log(
     if moved is None and pictured is None:
         raise LogError(f"{no_motion}; camera: {no_camera}")
     return LogDiagnosis(log.name, robot, moved, pictured, no_motion, no_camera, cautions)
+
+
+def _say_untried(catalogue: Catalogue) -> Iterator[str]:
+    """Say which effects of the user's and of plug-ins no log can show."""
+    tried = {*catalogue.shipped, *motion_effects(catalogue), *camera_effects(catalogue)}
+    for name in catalogue.names:
+        if name not in tried:
+            yield f"effect '{name}' has no trace, by which a log would show it, so it was not tried; give it one"
 
 
 def _or_refusal(ask: Callable[[], Part]) -> tuple[Part | None, str]:

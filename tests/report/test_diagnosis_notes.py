@@ -115,8 +115,9 @@ def test_the_next_drive_is_told_with_what_it_tells_and_values_beside_what_has_no
     assert told(50.0, "a", "b", verdict="cannot be told")[1] == "the same drives tell noise from what is missing"
     assert any("no physics yet" in line for line in motion_notes(diagnosis(verdict="partly explained")))
     assert motion_notes(diagnosis()) == []
-    (note,) = motion_notes(diagnosis(period=Period(4.0, 0.3, 1e-9)))
-    assert "as if it stood for 0.3 s every 4.0 s" in note
+    for lost_s, text in ((0.3, "0.3"), (0.012, "0.012")):
+        (note,) = motion_notes(diagnosis(period=Period(4.0, lost_s, 1e-9)))
+        assert f"as if it stood for {text} s every 4.0 s" in note
 
 
 NONE = Offset(0.0, (0.0, 0.0))

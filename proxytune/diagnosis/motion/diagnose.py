@@ -385,7 +385,9 @@ def declared_parameters(effects: Iterable[str], catalogue: Catalogue = SHIPPED) 
     for effect in effects:
         known = motion_effects(catalogue)
         if effect not in known:
-            raise LogError(f"--declared {effect}: no effect on motion has this name; {nearest(effect, known)}")
+            untraced = effect in catalogue.names and effect not in catalogue.shipped
+            lacks = "has no trace, by which a log would show it" if untraced else "no effect on motion has this name"
+            raise LogError(f"--declared {effect}: {lacks}; {'give it one' if untraced else nearest(effect, known)}")
         names += [name for name in catalogue.theta_names(effect) if not name.endswith(".imbalance")]
     return tuple(dict.fromkeys(names))
 

@@ -34,7 +34,7 @@ class Period(NamedTuple):
     chance: float
 
     def __str__(self) -> str:
-        return f"as if it stood for {self.lost_s:.1f} s every {self.period_s:.1f} s"
+        return f"as if it stood for {self.lost_s:.2g} s every {self.period_s:.1f} s"
 
 
 def find_period(drives: Drives, theta: Theta) -> Period | None:

@@ -9,6 +9,7 @@ import pytest
 from one_line import complaint_of
 from planted import ROBOT
 
+from proxytune.cli.main import main
 from proxytune.diagnosis.log_diagnosis import _say_untried
 from proxytune.diagnosis.motion.diagnose import declared_parameters
 from proxytune.diagnosis.motion.screening import motion_effects
@@ -135,7 +136,8 @@ def installed(tmp_path, monkeypatch):
     info.mkdir(parents=True)
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: slow_back_pack\nVersion: 1.0\n")
     (info / "entry_points.txt").write_text(f"[{GROUP}]\neffect.slow_back = slow_back_pack:WeakReverse\n")
-    (tmp_path / "site" / "slow_back_pack.py").write_text(WEAK_REVERSE, encoding="utf-8")
+    unsourced = WEAK_REVERSE.replace(' source="made up",', "")
+    (tmp_path / "site" / "slow_back_pack.py").write_text(unsourced, encoding="utf-8")
     monkeypatch.syspath_prepend(str(tmp_path / "site"))
 
 
@@ -196,7 +198,7 @@ def test_a_domain_takes_it_from_its_table_theta_or_a_model_and_tells_how_to_name
     assert re.search("weak_revers: no such effect; .*your own is written module:Attribute", told)
 
 
-def test_a_plugin_s_effect_takes_part_by_itself_and_is_listed(installed, folder, answered):
+def test_a_plugin_s_effect_takes_part_by_itself_and_is_listed_without_empty_lines(installed, folder, answered, capsys):
     catalogue, model = Catalogue(folder), Model("duckiebot", None, {"slow_back": 0.3}, {})
     assert "slow_back" in motion_effects(catalogue)
     assert "[effects.slow_back]" in model_text(model, catalogue=catalogue)
@@ -213,3 +215,7 @@ def test_an_effect_without_a_trace_is_said_to_be_untried_and_cannot_be_declared(
     (said,) = _say_untried(catalogue)
     assert said.startswith(f"effect '{NAME}' has no trace")
     assert f"--declared {NAME}: has no trace" in complaint_of(declared_parameters, (NAME,), catalogue)
+
+    assert (row["parameter"], row["stage"], row["high"], row["shape"]) == ("slow_back", "motion", 0.9, "")
+    assert main(["list", "effects", "slow_back"]) == 0
+    assert capsys.readouterr().out.endswith("slow_back, 0 to 0.9, without effect at 0\n")

@@ -69,8 +69,10 @@ def _effect_text(name: str) -> Group:
             unit = f" {one.unit}".rstrip()
             neutral = f"the robot's {plain(one.neutral)}" if isinstance(one.neutral, str) else f"{one.neutral:g}{unit}"
             usual = f" (of most robots {one.usual[0]:g} to {one.usual[1]:g})" if one.usual else ""
-            lines.append(f"\n{theta_name}, {one.low:g} to {one.high:g}{unit}{usual}, without effect at {neutral}")
-            lines += [f"  meaning: {clause_of(theta_name, one.name.upper())}", f"  source: {one.source}"]
+            still = f"{neutral} where it is not given" if one.shape else f"without effect at {neutral}"
+            lines.append(f"\n{theta_name}, {one.low:g} to {one.high:g}{unit}{usual}, {still}")
+            facts = {"meaning": clause_of(theta_name, one.name.upper()), "source": one.source}
+            lines += [f"  {what}: {said}" for what, said in facts.items() if said]
     return Group(*map(Text, lines))
 
 
@@ -110,7 +112,8 @@ def _effects() -> list[Row]:
             row: Row = {"effect": name, "stage": effect.stage.value, "parameter": theta_name, "unit": parameter.unit}
             first, last = parameter.usual_range
             row |= {"low": parameter.low, "high": parameter.high, "usual_low": first, "usual_high": last}
-            row |= {"neutral": parameter.neutral, "declared": "yes" if name in catalogue.declared else ""}
+            row |= {"neutral": parameter.neutral, "shape": "yes" if parameter.shape else ""}
+            row |= {"declared": "yes" if name in catalogue.declared else ""}
             rows.append(row | {"source": parameter.source, "of": "" if catalogue is SHIPPED else "car"})
     return rows
 

@@ -36,8 +36,8 @@ def what_it_does(effect: str, catalogue: Catalogue = SHIPPED) -> str:
 
 
 def clause_of(name: str, said: str) -> str:
-    """What a parameter's value says, by its name in θ; a user's own parameter is told by its name."""
-    return CLAUSES[name].format(said) if name in CLAUSES else f"{plain(name)} {said}"
+    """What a parameter's value says, by its name in θ; empty for a user's own parameter."""
+    return CLAUSES[name].format(said) if name in CLAUSES else ""
 
 
 def finding(effect: Mapping[str, Any], catalogue: Catalogue = SHIPPED) -> str:
@@ -50,7 +50,8 @@ def finding(effect: Mapping[str, Any], catalogue: Catalogue = SHIPPED) -> str:
     sized = {key: one for key, one in known.items() if one["value"] is not None}
     # What a form of the effect holds at 0 says nothing.
     told = {key: one for key, one in sized.items() if one["value"] != 0.0 or len(set(one["interval"])) > 1}
-    said = [clause_of(own.get(key, key), _size(one)) for key, one in told.items()]
+    sizes = {key: _size(one) for key, one in told.items()}
+    said = [clause_of(own.get(key, key), size) or f"{plain(key)} {size}" for key, size in sizes.items()]
     return f"{plain(name)}: {'; '.join([listed(said), *_worth(effect)])}" if said else plain(name)
 
 

@@ -86,6 +86,7 @@ def test_effects_are_a_row_each_within_80_columns_unbroken_and_an_unknown_one_is
     ("words", "said"),
     [
         (("effects", "dead_band"), "wheels stand still below a duty of WIDTH"),
+        (("effects", "slippery_patch"), "slippery_patch.radius, 0.1 to 5 m, 0.5 m where it is not given meaning"),
         (("effects", "steering_curve"), "without effect at the robot's wheel angle"),
         (("effects", "dead_band"), "of a car: dead_band: The motor does nothing"),
         (("effects", "yaw_scrub"), "without effect at the robot's effective baseline"),

@@ -64,7 +64,8 @@ def findings(effects: Iterable[Mapping[str, Any]], catalogue: Catalogue = SHIPPE
 def fitted(names: Iterable[str], theta: Mapping[str, Estimate]) -> str:
     """Values that were fitted of what was declared, as ", with trim 0.043 (0.042 to 0.044)"; empty where none was."""
     known = [name for name in names if name in theta and not name.endswith(".imbalance")]
-    said = [f"{plain(name).replace('.', ' ')} {_size(asdict(theta[name]))}" for name in known[:MOST_FITTED]]
+    words = {name: name if ":" in name else plain(name).replace(".", " ") for name in known[:MOST_FITTED]}
+    said = [f"{word} {_size(asdict(theta[name]))}" for name, word in words.items()]
     said += [f"{len(known) - MOST_FITTED} more"] * (len(known) > MOST_FITTED)
     return f", with {listed(said)}" if said else ""
 

@@ -77,8 +77,8 @@ def listed(names: Sequence[str]) -> str:
 
 
 def plain(name: str) -> str:
-    """The name of an effect as words."""
-    return name.replace("_", " ")
+    """The name of an effect as words; one's own, module:Attribute, as it is written in θ."""
+    return name if ":" in name else name.replace("_", " ")
 
 
 def with_unit(name: str, unit: str) -> str:

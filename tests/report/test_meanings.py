@@ -58,12 +58,17 @@ def test_what_was_found_or_declared_is_told_with_name_meaning_size_and_worth_and
     own = {"name": "gone:Wheel", "parameters": {"shrink": {"value": 0.25, "interval": [0.25, 0.25], "unit": "m"}}}
     own["parameters"]["grow"] = {"value": 0.0, "interval": [0.0, 0.0], "unit": "1/s"}
     assert finding(own) == "gone:Wheel: shrink 0.25 m"
+    several = {**own, "name": "my_lab:Wheel", "parameters": {"first_turn": own["parameters"]["shrink"]}}
+    assert finding(several) == "my_lab:Wheel: first turn 0.25 m"
     # A declared trim that was found stands in the first sentence; what is in no θ and equal wheels are not told.
     trim, delay = Estimate(0.0433, (0.0421, 0.0446), ""), Estimate(0.12, (0.1, 0.14), "s")
     assert fitted(("trim", "delay"), {"delay": delay, "trim": trim}) == (
         ", with trim 0.043 (0.042 to 0.045) and delay 0.12 s (0.10 to 0.14)"
     )
     assert fitted(("trim", "motor_lag.imbalance"), {"motor_lag.imbalance": trim}) == ""
+    assert fitted(("my_lab:Wheel.first_turn",), {"my_lab:Wheel.first_turn": delay}) == (
+        ", with my_lab:Wheel.first_turn 0.12 s (0.10 to 0.14)"
+    )
     many = fitted((f"wheel_gain.{side}" for side in "abcdef"), {f"wheel_gain.{side}": trim for side in "abcdef"})
     assert many.startswith(", with wheel gain a 0.043")
     assert many.endswith(" and 2 more")

@@ -1,6 +1,6 @@
 """Numbers and names as people read them."""
 
-from proxytune.report.wording import digits, fixed, listed, percent, probability, span
+from proxytune.report.wording import digits, fixed, listed, percent, plain, probability, span
 
 
 def test_numbers_have_a_true_minus_and_as_many_figures_as_their_width_allows_and_names_make_a_list():
@@ -12,3 +12,10 @@ def test_numbers_have_a_true_minus_and_as_many_figures_as_their_width_allows_and
     assert shares == ["100 %", "31 %", "0.16 %", "0.0012 %", "under 0.001 %", "0 %"]
     assert [probability(value) for value in (0.364, 0.0042, 0.0002)] == ["p = 0.36", "p = 0.0042", "p < 0.001"]
     assert [listed(list(names)) for names in ("", "a", "ab", "abc")] == ["", "a", "a and b", "a, b and c"]
+
+
+def test_names_are_told_as_words_and_one_s_own_effect_as_it_is_written_in_theta():
+    assert [plain(name) for name in ("dead_band", "my_lab:WheelDrag.first_turn")] == [
+        "dead band",
+        "my_lab:WheelDrag.first_turn",
+    ]

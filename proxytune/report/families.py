@@ -12,7 +12,7 @@ from rich.console import Group
 
 from proxytune.report import figure_style as style
 from proxytune.report.scores import differences_document, ends_document
-from proxytune.report.study.document import estimate_document, intervals_document
+from proxytune.report.study.document import estimate_document, intervals_document, pairs_document
 from proxytune.report.study.sentence import KnownParameter, known_parameters
 from proxytune.report.teaching import UNKNOWN, count
 from proxytune.report.text import file_texts, group_texts, note_texts, section_text
@@ -261,7 +261,7 @@ def _family_document(one: TunedFamily, cost: tuple[float, float, float]) -> dict
         "domain": dict(settings.domain.values),
         "theta": dict(one.theta),
         "theta_interval": intervals_document(result.knowledge.intervals),
-        "prpv": round(result.best.trial.prpv or 0.0),
+        "prpv": pairs_document(result.best.trial.prpv),
         "fresh": {
             "prpv": fresh.prpv.value,
             "prpv_interval": ends_document(fresh.prpv_interval.low, fresh.prpv_interval.high),

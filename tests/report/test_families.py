@@ -1,13 +1,20 @@
 """Sentence, figure and page of several families."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 from readable import assert_readable
 from several_tuned import compared, family, lesson
 
 from proxytune.learning import LearningEstimate
-from proxytune.report.families import _theta_cell, families_answer, families_figure, families_next_step
+from proxytune.report.families import (
+    _family_document,
+    _theta_cell,
+    families_answer,
+    families_figure,
+    families_next_step,
+)
 from proxytune.report.study.sentence import KnownParameter
 from proxytune.study import Lesson
 
@@ -85,3 +92,13 @@ def test_a_panel_per_use_tells_best_alike_and_worse_apart_draws_open_intervals_a
 def test_a_family_s_best_value_of_a_parameter_is_told_with_its_interval_and_one_that_it_lacks_left_out():
     known = KnownParameter("delay", "s", 0.1, (0.05, 0.15), 0.2, identified=True)
     assert (_theta_cell(known), _theta_cell(None)) == ("0.1 s (0.05 to 0.15)", "")
+
+
+@pytest.mark.parametrize(("prpv", "told"), [(None, None), (4.0, 4)])
+def test_a_prpv_that_a_family_has_not_is_null_not_that_of_a_perfect_proxy(prpv, told):
+    settings = SimpleNamespace(family="lane", domain=SimpleNamespace(values={}), home="here")
+    known = SimpleNamespace(intervals={}, misfit=SimpleNamespace(fits=None))
+    facts = {"best": SimpleNamespace(trial=SimpleNamespace(prpv=prpv)), "knowledge": known, "trials": ()}
+    result = SimpleNamespace(study=SimpleNamespace(settings=settings), stopped="", perfect=False, **facts)
+    one = SimpleNamespace(result=result, fresh=None, theta={}, seconds=1.0)
+    assert _family_document(one, (1.0, 0.9, 1.1))["prpv"] == told

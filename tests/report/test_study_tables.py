@@ -183,6 +183,14 @@ def test_how_a_study_came_to_its_end_what_matters_and_what_was_cut_off_and_saved
     assert found.episodes == result.episodes - 12
 
 
+def test_a_prpv_that_a_candidate_has_not_is_null_not_that_of_a_perfect_proxy(result):
+    found = confirmed(result)
+    answer = replace(found.confirmation.answer, trial=replace(result.best.trial, measures={"plv": 30.0}))
+    found = replace(found, confirmation=replace(found.confirmation, candidates=(answer,)))
+    (candidate,) = study_document(found)["best"]["fresh"]["candidates"]
+    assert (candidate["prpv"], candidate["fresh_prpv"]) == (None, [12])
+
+
 @pytest.mark.slow
 def test_failed_episodes_are_told_with_the_first_of_them(make_study):
     study = open_study(make_study(domain={"faults": '["agent3:1:raises"]'}, budget="6"))

@@ -86,6 +86,11 @@ def estimate_document(found: Estimate | LearningEstimate | None) -> dict[str, An
     return None if found is None else {"value": found.value, "interval": [found.low, found.high]}
 
 
+def pairs_document(prpv: float | None) -> int | None:
+    """PRPV as the whole number of pairs that it counts; None where it was not measured."""
+    return None if prpv is None else round(prpv)
+
+
 def _fresh(confirmation: Confirmation | None, *, by_prpv: bool) -> dict[str, Any] | None:
     """Scores of fresh episodes of the answer and of its rivals."""
     if confirmation is None:
@@ -99,8 +104,8 @@ def _fresh(confirmation: Confirmation | None, *, by_prpv: bool) -> dict[str, Any
         "candidates": [
             {
                 "index": one.trial.number or None,
-                "prpv": round(one.trial.prpv or 0.0),
-                "fresh_prpv": [None if score is None else round(score) for score in one.scores if by_prpv],
+                "prpv": pairs_document(one.trial.prpv),
+                "fresh_prpv": [pairs_document(score) for score in one.scores if by_prpv],
                 "fresh_scores": list(one.scores),
             }
             for one in confirmation.candidates
@@ -126,7 +131,7 @@ def _trial(trial: TrialRecord) -> dict[str, Any]:
     return {
         "index": trial.number,
         "theta": dict(trial.theta),
-        "prpv": None if trial.prpv is None else round(trial.prpv),
+        "prpv": pairs_document(trial.prpv),
         "ppv": trial.ppv,
         "measures": dict(trial.measures),
         "failed_episodes": trial.failed_episodes,

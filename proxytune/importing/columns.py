@@ -324,7 +324,7 @@ def commands_by_drive(table: Table, columns: Columns, kind: str) -> dict[str, Co
     drives = {}
     for name in dict.fromkeys(map(str, labels)):
         mine = labels == name
-        drives[name] = Commands(kind, times[mine], values[mine])
+        drives[name] = Commands(kind, times[mine], values[mine], in_rows="x" in columns and not own_clock)
         _check_clock(drives[name].times, f"{_where(table, name)}: commands")
     if not drives:
         raise LogError(f"{table.path}: has columns of commands, but no row with one; fill them, or take them out")

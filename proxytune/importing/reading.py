@@ -60,7 +60,7 @@ def clock_notes(drives: Sequence[Survey]) -> list[str]:
         remedy = "diagnose corrects that, --clock-offset declares it"
         return [f"{turn}: two clocks stamped commands and poses; {remedy}"]
     if not lags:
-        return ["no drive turns enough to tell whether commands and poses share a clock"]
+        return ["no drive turns as commanded, long and clearly enough to tell whether commands and poses share a clock"]
     usual = float(np.median([lag for lag, _ in lags]))
     together = "delay, lag and an offset between the two clocks together, which nothing here can tell apart"
     return [f"it turns {usual:.2f} s after its commands: {together}"]
@@ -71,7 +71,7 @@ def rows_notes(drives: Sequence[Drive]) -> list[str]:
     apart = [
         float(np.median(np.diff(one.poses.times)))
         for one in drives
-        if one.commands is not None and np.isin(one.commands.times, one.poses.times).all()
+        if one.commands is not None and one.commands.in_rows and np.isin(one.commands.times, one.poses.times).all()
     ]
     if not apart:
         return []

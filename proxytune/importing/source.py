@@ -27,6 +27,7 @@ class Commands:
     kind: str
     times: Floats
     values: Floats
+    in_rows: bool = False  # whether they stand in the rows of poses, and have no times of their own
 
 
 @dataclass(frozen=True)

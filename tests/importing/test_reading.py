@@ -1,11 +1,13 @@
 """Every form of one recording is the same log, written whole or not at all, and a drive is told in numbers."""
 
+import math
 import os
 from dataclasses import replace
 from pathlib import Path
 
 import foreign_robot
 import numpy as np
+import pandas as pd
 import pytest
 from imported_drives import drive, poses, turning
 from one_line import complaint_of
@@ -112,7 +114,8 @@ def read_as(monkeypatch, tmp_path, *drives):
 def test_commands_in_the_rows_of_poses_are_said_to_be_late():
     """A command that was issued between two rows stands in the later one; with times of their own there is no such."""
     turns = turning(0.1)
-    drive = replace(turns, commands=replace(turns.commands, times=turns.poses.times[: len(turns.commands.times)]))
+    times = turns.poses.times[: len(turns.commands.times)]
+    drive = replace(turns, commands=replace(turns.commands, times=times, in_rows=True))
     (note,) = rows_notes([drive])
     step = float(np.median(np.diff(drive.poses.times)))
     assert f"{step:.3g} s apart" in note
@@ -121,11 +124,28 @@ def test_commands_in_the_rows_of_poses_are_said_to_be_late():
     assert rows_notes([replace(drive, commands=None)]) == []
 
 
+def test_commands_of_a_file_or_a_clock_of_their_own_are_not_said_to_stand_in_the_rows_of_poses(tmp_path):
+    rows = [(k / 10, k / 50, 0, 0, 0.2, math.sin(k / 5)) for k in range(100)]
+    table = pd.DataFrame(rows, columns=["time", "x", "y", "heading", "v", "omega"])
+    table.to_csv(tmp_path / "together.csv", index=False)
+    (tmp_path / "apart").mkdir()
+    table.drop(columns=["v", "omega"]).to_csv(tmp_path / "apart" / "poses.csv", index=False)
+    table[["time", "v", "omega"]].to_csv(tmp_path / "apart" / "commands.csv", index=False)
+    table.assign(command_time=table["time"]).to_csv(tmp_path / "clocks.csv", index=False)
+    said = {name: " ".join(read_source(tmp_path / name, Wanted()).notes) for name in ("together.csv", "apart")}
+    said["clocks"] = " ".join(
+        read_source(tmp_path / "clocks.csv", Wanted(columns={"command_time": "command_time"})).notes
+    )
+    assert ["stand in the rows of poses" in notes for notes in said.values()] == [True, False, False]
+    # None of them turns: it is commanded to, and does not
+    assert all("no drive turns as commanded" in notes for notes in said.values())
+
+
 def test_what_was_found_joins_the_notes_and_without_commands_nothing_is_said_of_clocks(monkeypatch, tmp_path):
     found = read_as(monkeypatch, tmp_path, drive(np.append(TIMES, TIMES[-1]), TIMES))
     assert found.notes[0] == "taken as it is"
     assert "repeat a stamp" in found.notes[1]
-    assert found.notes[2].startswith("no drive turns enough")
+    assert found.notes[2].startswith("no drive turns as commanded")
     assert len(found.drives[0].poses.times) == len(TIMES)
     found = read_as(monkeypatch, tmp_path, replace(drive(TIMES, TIMES), commands=None))
     assert found.notes == ("taken as it is",)
@@ -164,7 +184,12 @@ def test_drop_outs_are_counted_apart_from_gaps_and_turning_before_or_after_the_c
     assert note.startswith("it turns 0.10 s after its commands: delay, lag and an offset")
     straight = replace(turning(0.1), poses=poses(np.arange(0.0, 40.0, 0.02)))
     assert survey(straight).lag_s is None
-    assert clock_notes([survey(straight)]) == ["no drive turns enough to tell whether commands and poses share a clock"]
+    untold = "no drive turns as commanded, long and clearly enough to tell whether commands and poses share a clock"
+    assert clock_notes([survey(straight)]) == [untold]
+    # One that turns the other way turns enough
+    against = turning(0.1)
+    against = replace(against, poses=replace(against.poses, headings=-against.poses.headings))
+    assert clock_notes([survey(against)]) == [untold]
 
 
 STAMPS = 1.7e9 + np.arange(0.0, 5.0, 0.05) + 1e-4 * np.sin(np.arange(100.0))

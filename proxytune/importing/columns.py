@@ -33,16 +33,16 @@ UNITS = {
     name: Unit(name, quantity, factor)
     for quantity, units in {
         "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9},
-        "length": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "km": 1e3},
+        "length": {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "km": 1e3},
         "angle": {"rad": 1.0, "deg": np.pi / 180.0},
-        "speed": {"m/s": 1.0, "cm/s": 1e-2, "mm/s": 1e-3, "km/h": 1.0 / 3.6},
+        "speed": {"m/s": 1.0, "mm/s": 1e-3, "cm/s": 1e-2, "km/h": 1.0 / 3.6},
         "turning speed": {"rad/s": 1.0, "deg/s": np.pi / 180.0, "rpm": np.pi / 30.0},
         "duty": {"duty": 1.0, "percent": 1e-2, "pwm255": 1.0 / 255.0},
         "number": {"number": 1.0},
     }.items()
     for name, factor in units.items()
 }
-"""Every unit by its name; the first of each quantity is the package's own."""
+"""Every unit by its name; the first of each quantity is the package's own, the others as they are likely."""
 ENDINGS = {unit.name.replace("/", "_"): unit for unit in UNITS.values() if unit.name not in ("duty", "number")} | {
     "sec": UNITS["s"],
     "nsec": UNITS["ns"],
@@ -234,7 +234,9 @@ def column_values(table: Table, column: Column) -> Floats:
     values = table.numbers(column.name)
     problem = contradiction(column.unit, values) if column.known_by in ("assumed", "by its name") else ""
     if problem:
-        remedy = f"state its unit, as in --columns {column.field}={column.name}:{column.unit.name}"
+        others = [unit for unit in UNITS.values() if unit.quantity == column.unit.quantity and unit != column.unit]
+        likely = next((unit for unit in others if not contradiction(unit, values)), column.unit)
+        remedy = f"state its unit, as in --columns {column.field}={column.name}:{likely.name}"
         if "pulses" in problem:
             remedy = "write such a column into the file"
         elif column.field == "throttle":

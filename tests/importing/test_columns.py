@@ -58,8 +58,8 @@ def test_a_name_s_ending_gives_a_unit_of_the_same_quantity_alone(name, quantity,
 @pytest.mark.parametrize(
     ("text", "quantity", "says"),
     [
-        ("x:furlong", "length", "here: unknown unit 'furlong'; known are: m, cm, mm, km"),
-        ("x:deg", "length", "'deg' is no unit of length; known are: m, cm, mm, km"),
+        ("x:furlong", "length", "here: unknown unit 'furlong'; known are: m, mm, cm, km"),
+        ("x:deg", "length", "'deg' is no unit of length; known are: m, mm, cm, km"),
         ("q:deg", "number", "has no unit; leave out ':deg'"),
     ],
 )

@@ -217,9 +217,11 @@ def test_tables_and_trajectories_go_without_commands_only_if_asked_for(file):
         ("time,x,y,heading\n0,0,0,0\n", "a single pose", "two or more"),
         ("time,x,y,heading\n0,,,\n1,,,\n", "no row with a pose", "give the file"),
         ("time,x,y,qx,qy,qz,qw\n0,0,0,0,0,0,1\n1,0,0,0,0,0,0\n", "orientation 2 is the quaternion (0, 0, 0, 0)", "set"),
-        ("time,x,y,yaw_deg\n0,0,0,1.2\n1,1,0,-3\n", "look like radians", "--columns heading=yaw_deg:deg"),
+        ("time,x,y,yaw_deg\n0,0,0,1.2\n1,1,0,-3\n", "look like radians", "--columns heading=yaw_deg:rad"),
         ("time,x_mm,y_mm,yaw\n0,0,0,0\n1,2.5,0,0\n", "moved 2.5 mm in all", "--columns x=x_mm:m"),
-        ("t_ns,x,y,yaw\n0,0,0,0\n0.1,2.5,0,0\n", "rows would be 1e-10 s apart", "--columns time=t_ns:ns"),
+        ("t_ns,x,y,yaw\n0,0,0,0\n0.1,2.5,0,0\n", "rows would be 1e-10 s apart", "--columns time=t_ns:s"),
+        ("t,x,y,yaw\n0,0,0,0\n50,1,0,0\n", "rows would be 50 s apart", "--columns time=t:ms"),
+        ("t,x,y,yaw\n0,0,0,0\n1,1240,0,0\n", "1240 m from end to end is much", "--columns x=x:mm"),
         ('time,x,y,"yaw\n0,0,0,0\n', "line 1: is not a row of a CSV table", "correct"),
     ],
 )
@@ -253,7 +255,7 @@ def test_bad_commands_are_refused(file, text, where):
         ({"haeding": "yaw"}, "unknown name 'haeding'; did you mean 'heading'?"),
         ({"x": "xx"}, "column map: x=xx: has no column 'xx'"),
         ({"heading": "headin"}, "did you mean 'heading'?"),
-        ({"x": "x:parsec"}, "unknown unit 'parsec'; known are: m, cm, mm, km"),
+        ({"x": "x:parsec"}, "unknown unit 'parsec'; known are: m, mm, cm, km"),
         ({"v": "lin"}, "has no column 'lin'"),
     ],
 )

@@ -14,7 +14,7 @@ from proxytune.logs.log import CAR_COMMANDS, COMMANDS, Log, LogEpisode
 from proxytune.logs.outliers import outliers_note, without_outliers
 from proxytune.logs.repeats import repeats_note
 from proxytune.logs.windows import windows_note
-from proxytune.settings import alike_caution, figure_cautions
+from proxytune.settings import GEOMETRY, alike_caution, figure_cautions
 
 Figures = Mapping[str, float]
 """Of a robot, by the names of robot.toml: wheel_radius, effective_baseline [m], full_speed [m/s]."""
@@ -55,7 +55,8 @@ def log_cautions(log: Log, figures: Figures) -> tuple[str, ...]:
     chords = [_chords(without_outliers(episode)) for episode in log.episodes]
     names = alike_caution("drives", (episode.name for episode in log.episodes))
     found = [
-        *figure_cautions({**figures, **log.geometry}, f"robot {log.robot}"),
+        *figure_cautions({**log.geometry, **figures}, f"robot {log.robot}"),
+        *_unused(log, figures),
         *_axes(chords),
         *_jumps(log, chords),
         *([] if log.command == "none" else _obedience(log, chords, figures)),
@@ -66,6 +67,15 @@ def log_cautions(log: Log, figures: Figures) -> tuple[str, ...]:
         *windows_note(log),
     ]
     return tuple(found)
+
+
+def _unused(log: Log, figures: Figures) -> Iterator[str]:
+    """Tell figures that log.toml states and its robot has otherwise: the robot's count."""
+    for key, figure in GEOMETRY.items():
+        stated = log.geometry.get(figure, np.nan)
+        if abs(stated - figures.get(figure, np.nan)) > 1e-6 * stated:
+            counts = f"its robot's own {figures[figure]:g} counts; leave it out, or put that right"
+            yield f"log.toml states {key} = {stated:g}, which is not used: {counts}"
 
 
 class Chords(NamedTuple):
@@ -183,7 +193,7 @@ def _commanded(log: Log, figures: Figures) -> list[tuple[Floats, Floats]]:
     figure = {"duty": "full_speed", "wheel_speed": "wheel_radius"}.get(log.command, "")
     # Throttle is no speed: a car's motor does nothing for small ones.
     unit = {"twist": 1.0, "speed_steering": 1.0, "ackermann": np.nan}.get(log.command)
-    scale = {**figures, **log.geometry}.get(figure, np.nan) if unit is None else unit
+    scale = {**log.geometry, **figures}.get(figure, np.nan) if unit is None else unit
     held = [episode.held for episode in log.episodes]
     if figure:
         return [(scale * one.mean(axis=1), one[:, 1] - one[:, 0]) for one in held]

@@ -74,7 +74,10 @@ CASES = {
     "x and y exchanged": (changed(exchanged), "places are mirrored against headings"),
     "a left-handed frame": (moved(1, -1, -1), "turns the other way than its commands say"),
     "duties at half scale": (commanded(0.5), r"drives (1.9|2|2.1) times as fast as its largest commands say: ch"),
-    "a wheel in mm": (replace(LOG, geometry={"wheel_radius": 31.8}), "its wheel_radius is 31.8 m, and robots have"),
+    "a figure that its robot has otherwise": (
+        replace(LOG, geometry={"full_speed": 1.5, "wheel_radius": 0.0318}),
+        r"log.toml states full_speed_m_s = 1.5, which is not used: its robot's own 0.6 counts; leave it out, or put",
+    ),
     "drives given three times": (THRICE, r"drive 'again' is a copy of '00' to the last digit \(and 1 more"),
     "an é in two forms": (named("\u00e9", "e\u0301"), "read the same and are taken for different ones"),
 }
@@ -97,6 +100,8 @@ def test_what_a_diagnosis_is_for_draws_no_caution(case):
 def test_thin_wheels_are_told_and_nothing_without_poses_or_figures():
     (line,) = figure_cautions({"wheel_radius": 3e-5, "full_speed": 0.6}, "robot mine")
     assert line.startswith("robot mine: its wheel_radius is 3e-05 m, and robots have 0.002 to 1.5 m")
+    (line,) = log_cautions(replace(LOG, geometry={"wheel_radius": 31.8}), {})
+    assert "its wheel_radius is 31.8 m, and robots have" in line
     assert cautions(changed(lambda episode: replace(episode, poses=np.full_like(episode.poses, np.nan)))) == ()
     assert log_cautions(commanded(0.5), {}) == ()
 

@@ -84,7 +84,8 @@ def duties_of(log: Log, robot: Robot, commands: Floats) -> Floats:
     fastest, full = float(np.abs(duties).max()), figures["full_speed"]
     if fastest > 1.0 + 1e-9:
         problem = f"asks a wheel for {fastest * full:.2f} m/s, more than the robot's full speed {full:g} m/s"
-        raise LogError(f"{log.name}: {problem}; state a higher full_speed_m_s in log.toml")
+        remedy = "state a higher full_speed in its robot.toml, or full_speed_m_s in log.toml where it has none"
+        raise LogError(f"{log.name}: {problem}; {remedy}")
     return np.asarray(duties)
 
 

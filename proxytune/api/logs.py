@@ -54,8 +54,8 @@ def record_log(
     """
     family = recordable(settings, model)
     drives = film(family, wanted.frames, wanted.seed) if wanted.frames else ()
-    table = None if wanted.commands is None else read_commands(wanted.commands)
-    for drive, (times, _) in () if table is None else table[1].items():
+    table = None if wanted.commands is None else (str(wanted.commands), *read_commands(wanted.commands))
+    for drive, (times, _) in () if table is None else table[2].items():
         if (lasts := times[-1] - times[0]) > LONGEST_S:
             remedy = f"cut it into drives of at most {LONGEST_S:g} s, or check its times"
             raise LogError(f"{wanted.commands}: drive '{drive}' lasts {lasts:g} s; {remedy}")

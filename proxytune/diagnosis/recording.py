@@ -33,8 +33,8 @@ CAMERA = {
     "poses": {"position_m": POSITION_NOISE_M, "heading_deg": round(math.degrees(HEADING_NOISE_RAD), 4)},
 }
 """What log.toml states of the pictures: no effect adjusts the exposure from one to the next."""
-Table = tuple[str, Mapping[str, tuple[Floats, Floats]]]
-"""Kind of commands, and each drive's times [s] and commands, as `proxytune.logs.read_commands` gives them."""
+Table = tuple[str, str, Mapping[str, tuple[Floats, Floats]]]
+"""Where it lies, and what `proxytune.logs.read_commands` gives: kind of commands, times [s] and commands by drive."""
 
 
 def record(
@@ -57,7 +57,7 @@ def record(
     rate = robot.figures["control_rate"]
     times = np.arange(round(seconds * rate)) / rate
     instance = family.instance({})
-    own = [] if table is None else _duties(Log(name, family.robot, table[0], rate, {}, ()), robot, table[1])
+    own = [] if table is None else _duties(Log(table[0], family.robot, table[1], rate, {}, ()), robot, table[2])
     episodes = []
     for number in range(repeats * (len(own) or len(LIBRARY))):
         random = np.random.default_rng((seed, number))

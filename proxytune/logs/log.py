@@ -34,10 +34,11 @@ WHEELS = ("wheel_left", "wheel_right")
 def check_kind(command: str, robot: str, drive: str, where: str) -> None:
     """Refuse commands of another kind than a robot takes that drives as this; a twist is for any."""
     if command not in ("twist", "none") and (command in CAR_COMMANDS) != (drive == "ackermann"):
-        drives = "steers" if drive == "ackermann" else "drives by two wheels"
+        car = drive == "ackermann"
+        drives, kinds = ("steers", CAR_COMMANDS) if car else ("drives by two wheels", ("duty", "wheel_speed"))
         raise LogError(
             f"{where}: commands of kind '{command}' are not for robot '{robot}', which {drives} "
-            f'(drive = "{drive}" in its robot.toml); name another with --robot'
+            f'(drive = "{drive}" in its robot.toml); give {", ".join(kinds)} or twist, or name another robot'
         )
 
 

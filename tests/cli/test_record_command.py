@@ -118,8 +118,13 @@ def test_a_table_of_commands_is_driven_as_it_is(recorded, tmp_path, kind):
     [
         ("episode,time,a,b\nnext,0,1,1\n", "has no columns of commands; name them as a log does"),
         ("episode,time,left,right\nnext,0,1,1\nnext,1e5,1,1\n", "drive 'next' lasts 100000 s; cut it into drives"),
-        ("episode,time,throttle,steering\nnext,0,1,1\n", "which drives by two wheels"),
-        ("episode,time,v,omega\nnext,0,9,1\n", "more than the robot's full speed"),
+        (
+            "episode,time,throttle,steering\nnext,0,1,1\n",
+            "commands.csv: commands of kind 'ackermann' are not for robot",
+        ),
+        ("episode,time,throttle,steering\nnext,0,1,1\n", "; give duty, wheel_speed or twist, or name another robot"),
+        ("episode,time,v,omega\nnext,0,9,1\n", "commands.csv: asks a wheel for 9.08 m/s, more than the robot's full"),
+        ("episode,time,v,omega\nnext,0,9,1\n", "; state a higher full_speed in its robot.toml"),
         ("episode,time,left,right\nnext,0,1,nan\n", "column 'right'"),
     ],
 )

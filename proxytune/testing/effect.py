@@ -179,11 +179,13 @@ def _of_the_robot(subject: Subject) -> Effect | None:
 def _claim_moves(subject: Subject, parameter: Parameter, least: float) -> None:
     """Each step over its usual range changes the signal, and so does each probe."""
     signal = subject.signal(6, 2700)
+    shaping = parameter is not subject.kind.parameters[0] and not parameter.shape
+    remedy = "; declare one that only shapes another with Parameter(shape=True)" if shaping else ""
     steps = np.linspace(*parameter.usual_range, STEPS)
     filtered = [subject.filtered(subject.moved(parameter, float(value)), signal) for value in steps]
     for (low, earlier), (high, later) in pairwise(zip(steps, filtered, strict=True)):
         line = f"is the same at {parameter.name} {low:g} and {high:g}; a parameter must matter all along its range"
-        claim(_apart(earlier, later) > least, f"effect '{subject.name}' {line}")
+        claim(_apart(earlier, later) > least, f"effect '{subject.name}' {line}{remedy}")
     signal, neutral = subject.signal(2, 900), subject.neutral[parameter.name]
     still = subject.filtered(subject.moved(parameter, neutral), signal)
     for probe in parameter.probes:

@@ -88,6 +88,20 @@ class Idle(Slow):
         return super().apply(signal, memory) if self.share < 0.5 else Slow(0.5).apply(signal, memory)
 
 
+@dataclass(frozen=True)
+class Bent(Slow):
+    """What is slowed is the more so the larger it is: of no matter where nothing is slowed."""
+
+    bend: float = 1.0
+    parameters: ClassVar[tuple[Parameter, ...]] = (
+        *Slow.parameters,
+        Parameter(name="bend", unit="", low=0.5, high=2.0, neutral=1.0, probes=(0.7, 1.5)),
+    )
+
+    def apply(self, signal, memory):
+        return signal * (1.0 - self.share * np.abs(signal) ** self.bend), memory
+
+
 class OneByOne(Slow):
     def apply(self, signal, memory):
         return signal + self.share * np.abs(signal).mean(axis=tuple(range(signal.ndim - 2)), keepdims=True), memory
@@ -112,7 +126,8 @@ BROKEN_EFFECTS = {
     Seeded: "depends on the seed, and its trace says otherwise",
     NotNeutral: "changes the signal at its neutral value",
     Endless: "is not finite|must keep the shape, all finite",
-    Idle: "is the same at share .*; a parameter must matter all along its range",
+    Idle: "is the same at share .*; a parameter must matter all along its range$",
+    Bent: r"same at bend 0.5 and .*; declare one that only shapes another with Parameter\(shape=True\)",
     OneByOne: "filters a batch unlike its members",
     Raises: "'slow' raised ValueError: too slow at .*; correct its begin and apply",
     NoProbes: "'share' has no probes, from which a search sets out",
@@ -123,6 +138,8 @@ BROKEN_EFFECTS = {
 def test_an_effect_agent_engine_or_measure_that_keeps_every_promise_passes():
     effect: type[Effect] = Slow
     assert check_effect(effect) is None
+    share, bend = Bent.parameters
+    assert check_effect(type("Shaped", (Bent,), {"parameters": (share, replace(bend, shape=True))})) is None
     assert check_agent(Agent) is check_agent(AGENTS["steady"]) is None
     assert check_engine(Engine("mine", "mine", "the design", Proposer)) is None
     assert check_measure(measure(bias), perfect=0.0) is None

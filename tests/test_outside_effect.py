@@ -203,7 +203,9 @@ def test_a_plugin_s_effect_takes_part_by_itself_and_is_listed_without_empty_line
     assert "slow_back" in motion_effects(catalogue)
     assert "[effects.slow_back]" in model_text(model, catalogue=catalogue)
     (row,) = [row for row in answered("list", "effects")["effects"] if row["effect"] == "slow_back"]
-    assert (row["parameter"], row["stage"], row["high"]) == ("slow_back", "motion", 0.9)
+    assert (row["parameter"], row["stage"], row["high"], row["shape"]) == ("slow_back", "motion", 0.9, "")
+    assert main(["list", "effects", "slow_back"]) == 0
+    assert capsys.readouterr().out.endswith("slow_back, 0 to 0.9, without effect at 0\n")
 
 
 def test_an_effect_without_a_trace_is_said_to_be_untried_and_cannot_be_declared(folder):
@@ -215,7 +217,3 @@ def test_an_effect_without_a_trace_is_said_to_be_untried_and_cannot_be_declared(
     (said,) = _say_untried(catalogue)
     assert said.startswith(f"effect '{NAME}' has no trace")
     assert f"--declared {NAME}: has no trace" in complaint_of(declared_parameters, (NAME,), catalogue)
-
-    assert (row["parameter"], row["stage"], row["high"], row["shape"]) == ("slow_back", "motion", 0.9, "")
-    assert main(["list", "effects", "slow_back"]) == 0
-    assert capsys.readouterr().out.endswith("slow_back, 0 to 0.9, without effect at 0\n")

@@ -118,7 +118,9 @@ def print_answer(answer: Answer, *, as_json: bool) -> None:
         elif isinstance(answer.text, str):
             print(answer.text)
         else:
-            Console().print(answer.text, crop=False)
+            console = Console()
+            # What is piped is not broken at a width: a path may have blanks
+            console.print(answer.text, crop=False, soft_wrap=not console.is_terminal)
         sys.stdout.flush()
     except OSError as problem:
         # What is still in the buffer would raise once more when Python ends.

@@ -17,12 +17,13 @@ from proxytune.cli import listing, plot
 from proxytune.cli.commands import OPTIONS, epilog
 from proxytune.cli.diagnose import limits_of
 from proxytune.cli.main import BAD_INPUT, COMMANDS, DONE, FAILED, formats, main, parse, parser
-from proxytune.cli.terminal import Answer, prints_to_stderr
+from proxytune.cli.terminal import Answer, print_answer, prints_to_stderr
 from proxytune.diagnosis import LIMITS
 from proxytune.errors import EpisodeError, ScoresError, SettingsError, StoreError
 from proxytune.extensions import Interrupted
 from proxytune.logs import COMMANDS as KINDS
 from proxytune.report import FILTER, FORMATS
+from proxytune.report.text import file_texts, group_texts
 from proxytune.seeds import TARGET_OFFSET
 from proxytune.starting import STOPPING
 
@@ -147,6 +148,16 @@ def test_what_is_not_json_is_a_defect_and_not_printed_but_a_path_that_is_no_utf_
     monkeypatch.setattr(listing, "run", lambda arguments: Answer({"path": "caf\udce9"}, ""))
     assert main(["list", "maps", "--json"]) == 0
     assert json.loads(capsys.readouterr().out.encode("utf-8")) == {"path": "caf\udce9"}
+
+
+def test_a_path_with_blanks_that_is_piped_stands_in_one_line_and_on_a_terminal_it_is_broken(monkeypatch, capsys):
+    path = "/home/me/the measurements of spring/" + "a long name " * 6 + ".png"
+    monkeypatch.setenv("COLUMNS", "80")
+    print_answer(Answer({}, group_texts(*file_texts({"figure": path}))), as_json=False)
+    assert capsys.readouterr().out == f"figure: {path}\n"
+    monkeypatch.setenv("FORCE_COLOR", "1")
+    print_answer(Answer({}, group_texts(*file_texts({"figure": path}))), as_json=False)
+    assert len(capsys.readouterr().out.splitlines()) == 2
 
 
 @pytest.mark.parametrize(

@@ -11,6 +11,7 @@ import tomllib
 import unicodedata
 from collections.abc import ItemsView, Iterable, Iterator, KeysView, Mapping
 from dataclasses import dataclass
+from numbers import Integral
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -314,6 +315,14 @@ def allowed_bytes(usual_mb: float) -> float:
         return 1e6 * max(usual_mb, float(stated))
     except ValueError:
         raise InputError(f"{LARGEST}={stated}: must be a number of megabytes, as in {LARGEST}=4000") from None
+
+
+def check_whole(name: str, given: object, low: int = 0) -> None:
+    """Refuse an argument that is no whole number, or too low a one, by an InputError."""
+    if not isinstance(given, Integral):
+        raise InputError(f"{name} must be a whole number, got {given!r}")
+    if given < low:
+        raise InputError(f"{name} must be at least {low}, got {given}")
 
 
 def is_finite(value: float) -> bool:

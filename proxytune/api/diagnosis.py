@@ -25,6 +25,7 @@ from proxytune.effects import Catalogue
 from proxytune.errors import InputError
 from proxytune.importing import open_log
 from proxytune.logs import Log
+from proxytune.settings import check_whole
 
 IN_PYTHON = {"--robot": "robot=…", "--declared ": "declared: ", "--test": "test"}
 """What a complaint calls an option of the command, and what it is here."""
@@ -155,8 +156,7 @@ def diagnose(
     Raises:
         InputError: If the log, the robot or an effect cannot be used.
     """
-    if seed < 0:
-        raise InputError(f"seed must be at least 0, got {seed}")
+    check_whole("seed", seed)
     with open_log(log) as (drives, _), nullcontext((None, ())) if test is None else open_log(test) as (others, _):
         try:
             vehicle = robot_of(drives, robot, Catalogue(Path.cwd(), tuple(effects)))

@@ -12,7 +12,7 @@ from proxytune.effects import SHIPPED, Catalogue, read_model
 from proxytune.errors import InputError
 from proxytune.report import frame_html
 from proxytune.seeds import episode_seed
-from proxytune.settings import numbers_in
+from proxytune.settings import check_whole, numbers_in
 from proxytune.space import Theta
 from proxytune.storage import FILE_NAME as DATABASE
 from proxytune.sweep import best_theta, has_answer
@@ -41,7 +41,7 @@ class DrivenEpisode:
 
 
 def drive(
-    study: str | Path, agent: str, theta: Theta | None = None, *, start: int = 0, seed: int | None = None
+    study: str | Path, agent: str, theta: Theta | str | None = None, *, start: int = 0, seed: int | None = None
 ) -> DrivenEpisode:
     """Let an agent drive once in the proxy of a study.
 
@@ -50,7 +50,7 @@ def drive(
     Args:
         study: The study's folder, or its study.toml.
         agent: Its name, one of `python -m proxytune list agents`, or your own as "module:attribute".
-        theta: Parameters of the domain instance; those not named are nominal.
+        theta: Parameters of the domain instance, those not named are nominal; or "best", "nominal" or a model.toml.
         start: Which of the family's starting conditions, from 0.
         seed: Seed of everything random, as in study.toml; the study's own if not given.
 
@@ -60,11 +60,15 @@ def drive(
     """
     settings = studies.read_study_settings(Path(study))
     family = studies.load_family(settings, settings.proxy)
-    studies.check_episode(family, agent, theta or {}, start)
-    if seed is not None and seed < 0:
-        raise InputError(f"seed must be at least 0, got {seed}")
-    own = episode_seed(settings.seed if seed is None else seed, start)
-    kept = studies.record_episode(family, make_episode(theta or {}, agent=agent, start=start, seed=own))
+    values = choose_theta(theta, settings, family, "theta")[0] if isinstance(theta, str) else theta or {}
+    study_seed = settings.seed if seed is None else seed
+    if not isinstance(agent, str):
+        raise InputError(f"agent must be a name, as in 'steady', got {agent!r}")
+    check_whole("start", start)
+    check_whole("seed", study_seed)
+    studies.check_episode(family, agent, values, start)
+    own = episode_seed(study_seed, start)
+    kept = studies.record_episode(family, make_episode(values, agent=agent, start=start, seed=own))
     poses, commands = (pd.DataFrame(dict(columns)) if columns else None for columns in (kept.poses, kept.commands))
     return DrivenEpisode(dict(kept.metrics), poses, commands)
 

@@ -7,6 +7,7 @@ import pandas as pd
 
 from proxytune.errors import InputError
 from proxytune.search import Engine, Trial, Values, make_proposer
+from proxytune.settings import check_whole
 from proxytune.space import Interval, Space, Theta
 
 
@@ -45,8 +46,7 @@ class SearchBox:
             InputError: If the box is empty or inside out, or the engine cannot be used.
         """
         for name, number, lowest in (("initial", initial, 1), ("seed", seed, 0)):
-            if number < lowest:
-                raise InputError(f"{name} must be at least {lowest}, got {number}")
+            check_whole(name, number, lowest)
         self._space = box_space(box)
         self._proposer, self._seed, self._sign = make_proposer(engine, initial), seed, -1.0 if maximise else 1.0
         self._asked: list[Values] = []

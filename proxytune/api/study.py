@@ -12,9 +12,9 @@ from matplotlib.figure import Figure
 
 from proxytune import report, study
 from proxytune.domain import Outcome
-from proxytune.errors import InputError
 from proxytune.running import Watcher, watching
 from proxytune.search import History, optimize_result
+from proxytune.settings import check_whole
 from proxytune.space import Theta
 from proxytune.storage import Store, locked
 
@@ -87,10 +87,10 @@ class StudyReport(report.Shown):
             seed: Of the draws.
 
         Raises:
-            InputError: If the number of draws is not positive.
+            InputError: If the number of draws, or the seed, cannot be used.
         """
-        if draws < 1:
-            raise InputError(f"draws must be at least 1, got {draws}")
+        check_whole("draws", draws, 1)
+        check_whole("seed", seed)
         return pd.DataFrame(self.result.knowledge.draw(draws, seed), columns=list(self.result.knowledge.space.names))
 
     def figures(self) -> dict[str, Figure]:

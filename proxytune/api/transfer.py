@@ -19,7 +19,7 @@ from proxytune.report import clocks_document, clocks_notes, frame_html, write_pi
 from proxytune.running import watching
 from proxytune.scores import ScoreTable, write_scores
 from proxytune.seeds import target_seed
-from proxytune.settings import GEOMETRY
+from proxytune.settings import GEOMETRY, check_whole
 from proxytune.study import bare_family, cautions_of, measure_agents, read_study_settings
 
 MOST_REPEATS = 1_000_000
@@ -171,8 +171,7 @@ def measure(
     """
     settings, path = read_study_settings(Path(study)), Path(model)
     own = target_seed(settings.seed) if seed is None else seed
-    if own < 0:
-        raise InputError(f"--seed must be at least 0, got {own}")
+    check_whole("--seed", own)
     if not 1 <= repeats <= MOST_REPEATS:
         raise InputError(f"--repeats must be between 1 and {MOST_REPEATS}, got {repeats}")
     if not path.is_file():

@@ -18,6 +18,7 @@ import numpy as np
 
 from proxytune.errors import InputError, ScoresError
 from proxytune.scores import Metric, ScoreTable, score_cautions
+from proxytune.settings import check_whole
 from proxytune.usefulness import resampling
 from proxytune.usefulness.comparison import Comparison, compare, repeats
 from proxytune.usefulness.decision import ASKED, Asked, Decision, Difference, Together, chosen, compare_all, decide
@@ -242,8 +243,7 @@ def assess_each(
     seed: int = 0,
 ) -> tuple[dict[str, Assessment], Selection | None]:
     """Assess proxies of one target by name, and rank them where there are several."""
-    if seed < 0:
-        raise InputError(f"seed must be at least 0, got {seed}")
+    check_whole("seed", seed)
     if not FEWEST_RESAMPLES <= resamples <= MOST_RESAMPLES:
         raise InputError(f"resamples must be between {FEWEST_RESAMPLES} and {MOST_RESAMPLES}, got {resamples}")
     found = {

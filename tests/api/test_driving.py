@@ -80,7 +80,19 @@ def test_an_episode_that_fails_and_a_folder_that_is_no_study_are_one_line(make_s
         (("agent0", {"trim": float("nan")}), {}, r"θ: trim must lie within \[-0.3, 0.3\], got nan"),
         (("agent0",), {"start": 5}, "start 5: the family has 5; give 0 to 4"),
         (("agent0",), {"seed": -1}, "seed must be at least 0, got -1"),
+        (("agent0",), {"seed": 1.5}, "seed must be a whole number, got 1.5"),
+        (("agent0",), {"start": "0"}, "start must be a whole number, got '0'"),
+        ((None,), {}, "agent must be a name, as in 'steady', got None"),
     ],
 )
 def test_what_the_family_has_not_is_refused_with_what_it_has(make_study, arguments, changes, words):
     assert re.search(words, complaint_of(drive, make_study(), *arguments, **changes))
+
+
+def test_a_theta_may_be_called_best_or_nominal_as_on_the_command_line(lane, driven, make_study):
+    nominal = drive(lane, "steady", "nominal")
+    pd.testing.assert_frame_equal(nominal.poses, drive(lane, "steady").poses)
+    assert not nominal.poses.equals(driven.poses)
+    folder = make_study(budget="1", initial="1")
+    theta = run_study(folder).theta
+    assert drive(folder, "agent0", "best").scores == drive(folder, "agent0", theta).scores

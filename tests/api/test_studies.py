@@ -47,6 +47,7 @@ def test_the_trials_are_a_table_and_an_optimize_result_and_theta_is_drawn_from_t
     assert list(drawn.columns) == list(learnt.space.names)
     assert drawn.equals(report.posterior(draws=20_000, seed=3))
     assert not drawn.equals(report.posterior(draws=20_000, seed=4))
+    assert complaint_of(lambda: report.posterior(seed="a")) == "seed must be a whole number, got 'a'"
     for box in learnt.space.intervals:
         ends = drawn[box.name].quantile([0.025, 0.975])
         np.testing.assert_allclose(ends, learnt.intervals[box.name], atol=0.02 * (box.high - box.low))

@@ -14,12 +14,11 @@ from proxytune import driving, report
 from proxytune.api.study import read_study
 from proxytune.effects import Catalogue, FilterContext, effect_of
 from proxytune.errors import InputError
-from proxytune.extensions import is_ours
 from proxytune.files import check_place, write_whole
 from proxytune.search import History, write_optuna, write_skopt
 from proxytune.settings import figure_cautions, nearest
 from proxytune.space import Theta
-from proxytune.study import FILE_NAME, bare_family
+from proxytune.study import FILE_NAME, bare_family, read_study_settings
 
 TRIALS: Mapping[str, Callable[[History, Path], None]] = {"optuna": write_optuna, "skopt": write_skopt}
 """Formats that take the trials of a study, not what was found."""
@@ -154,11 +153,14 @@ def _instance_of(path: Path) -> tuple[report.Instance, tuple[str, ...]]:
     if (diagnosed := path / "model.toml").is_file() and not (path / FILE_NAME).exists():
         raise InputError(f"{path}: is no study's folder; give what was diagnosed, {diagnosed}")
     if path.is_dir():
-        result = read_study(path).result
-        settings, region = result.study.settings, result.knowledge
-        family = bare_family(settings, settings.proxy) if is_ours(settings.family) else None
+        settings = read_study_settings(path)
+        ours = settings.family.startswith("proxytune.driving")
+        # Its agents, which may be a user's code, are not asked for
+        family = bare_family(replace(settings, agents=()), settings.proxy) if ours else None
         if not isinstance(family, driving.LaneFollowing):
             raise InputError(f"{path}: is a study of another simulator; only what drives here can be exported")
+        result = read_study(path).result
+        region = result.knowledge
         robot = driving.read_robot(family.robot, family.folder)
         theta = {**robot.theta, **dict(family.effects), **result.best.trial.theta}
         return report.Instance(robot, theta, dict(region.intervals), f"the best θ of the study {settings.name}"), ()

@@ -62,19 +62,28 @@ SHORT = {
 
 
 @pytest.mark.slow
-def test_the_best_theta_of_a_study_is_exported_with_intervals_whatever_agents_are_called(
+def test_the_best_theta_of_a_study_is_exported_with_intervals_whatever_agents_are_called_and_without_their_code(
     make_study, tmp_path, answered
 ):
     folder = make_study(agents=None, **SHORT)
     with (folder / "study.toml").open("a") as study:
-        study.write('\n[agents]\nslow = "steady"\nwild = "daredevil"\n')
+        study.write('\n[agents]\nslow = "steady"\nwild = "mine:Wild"\n')
+    (folder / "mine.py").write_text("from proxytune.driving import AGENTS\n\nWild = AGENTS['daredevil']\n")
     (folder / "target.csv").write_text("agent,episode,distance\nslow,0,0.2\nwild,0,0.5\n")
     best = answered("study", folder)["best"]["theta"]
+    (folder / "mine.py").unlink()
     document = answered("export", folder, "--to", "ros", "--output", tmp_path / "robot.yaml")
     values = {line["name"]: line for line in (*document["written"], *document["no_place"])}
     assert {name: values[name]["value"] for name in best} == best
     assert len(values["trim"]["interval"]) == 2
     assert values["motor_lag.time_constant"]["value"] == 0.2
+
+
+def test_a_study_of_another_simulator_is_refused_before_its_code_is_asked_for(make_study, tmp_path, refused):
+    folder = make_study(
+        family='"proxytune.environments.family:gymnasium_family"', domain={"environment": '"mine:Cart"'}
+    )
+    assert "is a study of another simulator" in refused("export", folder, "--to", "ros", "--output", tmp_path / "out")
 
 
 def test_trials_are_what_scikit_optimize_loads_and_other_simulators_refused(

@@ -78,7 +78,7 @@ def export(
     to: str = "",
     into: str | Path | None = None,
     wheels: Sequence[str] = (),
-    has: Sequence[str] = (),
+    has: str | Sequence[str] = (),
 ) -> ExportReport:
     """Write what was found for another simulator or the robot, or a study's trials for other optimisers.
 
@@ -111,18 +111,21 @@ def export(
         facts = told | {"into": str(given), "has": sorted(patched.has), "diff": patched.diff}
         return ExportReport(file, given.suffix[1:], report.export_lines(instance, report.FILTER, patched.has), facts)
     if to == report.FILTER:
-        _check_has(has, instance.robot.catalogue)
-        text, lines = report.node_text(instance, has), report.export_lines(instance, report.FILTER, has)
+        there = _names_of(has, instance.robot.catalogue, "--has ")
+        text, lines = report.node_text(instance, there), report.export_lines(instance, report.FILTER, there)
     else:
         text, lines = WRITERS[to](instance), report.export_lines(instance, to)
     report.write_text(file, text)
     return ExportReport(file, to, lines, told)
 
 
-def _check_has(has: Sequence[str], catalogue: Catalogue) -> None:
-    for name in has:
+def _names_of(has: str | Sequence[str], catalogue: Catalogue, what: str) -> tuple[str, ...]:
+    """Effects that a simulator has already; a text is one of them."""
+    names = (has,) if isinstance(has, str) else tuple(has)
+    for name in names:
         if not catalogue.knows(name):
-            raise InputError(f"--has {name}: no such effect; {nearest(name, catalogue.names)}")
+            raise InputError(f"{what}{name}: no such effect; {nearest(name, catalogue.names)}")
+    return names
 
 
 def _export_trials(folder: Path, output: Path, to: str) -> ExportReport:
@@ -205,7 +208,7 @@ class CommandFilter:
         *,
         rate_hz: float,
         command: str = "twist",
-        has: Sequence[str] = (),
+        has: str | Sequence[str] = (),
         start: tuple[float, float, float] = (0.0, 0.0, 0.0),
         seed: int = 0,
         figures: Mapping[str, float] | None = None,
@@ -224,8 +227,8 @@ class CommandFilter:
         self._steers = instance.steers
         if command not in (kinds := COMMANDS[instance.robot.drive]):
             raise InputError(f"command='{command}': must be " + " or ".join(f"'{one}'" for one in kinds))
-        _check_has(has, instance.robot.catalogue)
-        left_out = set(has) - set(report.IN_WHEELS)
+        there = _names_of(has, instance.robot.catalogue, "has=")
+        left_out = set(there) - set(report.IN_WHEELS)
         effects = [one for name, one in instance.effects.items() if name not in left_out]
         self._twist, self._train = command == "twist", driving.drivetrain(instance.robot, effects)
         self._full, self._command, self._angle = instance.figure("full_speed"), command, 0.0
@@ -233,7 +236,7 @@ class CommandFilter:
             self._wheelbase, self._lock = instance.figure("wheelbase"), math.radians(instance.figure("wheel_angle"))
         else:
             self._nominal = instance.figure("effective_baseline")
-        behind = replace(instance, theta={n: v for n, v in instance.theta.items() if effect_of(n) in has})
+        behind = replace(instance, theta={n: v for n, v in instance.theta.items() if effect_of(n) in there})
         self._gains = behind.gains
         self._baseline = 0.0 if self._steers else behind.baseline_m
         x, y, heading = start

@@ -236,6 +236,8 @@ def test_what_would_overwrite_or_misread_the_users_own_is_refused(model, tmp_pat
     assert "mine.urdf: is read by this command, and would be lost" in told
     assert "model.toml: is read by this command" in complaint_of(lambda: export(model, model, to="ros"))
     assert "--to urf: no such format; did you mean 'urdf'?" in complaint_of(lambda: export(model, "o", to="urf"))
+    told = complaint_of(lambda: CommandFilter(model, rate_hz=HZ, has="trimm"))
+    assert told == "has=trimm: no such effect; did you mean 'trim'?"
     assert "two finite numbers" in complaint_of(CommandFilter(model, rate_hz=HZ).step, (np.nan, 0.0))
 
 
@@ -245,7 +247,7 @@ def test_the_ros_node_tells_what_the_python_class_answers_and_stops_after_silenc
 ):
     path = export(model, tmp_path / "bend.py", to="filter", has=("trim",)).output
     module = load_node(path, monkeypatch, stamped=stamped)
-    node, bent = module.CommandVelocityFilter(), CommandFilter(model, rate_hz=HZ, has=("trim",))
+    node, bent = module.CommandVelocityFilter(), CommandFilter(model, rate_hz=HZ, has="trim")
     said = Stamped() if stamped else Twist()
     twist = said.twist if stamped else said
     twist.linear.x, twist.angular.z = 0.3, 0.5

@@ -97,6 +97,10 @@ def export(
     path, file = Path(model), Path(output)
     if bool(to) == (into is not None):
         raise InputError("give either --to FORMAT for a new file, or --into FILE for a patched copy of yours")
+    if has and to != report.FILTER:
+        raise InputError("--has: is for --to filter; leave it out")
+    if wheels and into is None:
+        raise InputError("--wheels: is for --into FILE; leave it out")
     check_place(file, inputs=filter(None, (path, into)))
     if to in TRIALS:
         return _export_trials(path, file, to)

@@ -77,6 +77,8 @@ def import_log(
     """
     known, path = facts or Facts(), Path(source)
     whole = read_source(path, wanted or Wanted(), known.offset_s)
+    if known.road and all(drive.pictures is None for drive in whole.drives):
+        raise LogError(f"{path}: --map is the map that pictures show, and it has none; leave that out")
     found = with_named_pictures(whole, known)
     if output is not None:
         folder = Path(output)

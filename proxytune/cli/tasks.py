@@ -74,6 +74,10 @@ def measure(arguments: argparse.Namespace) -> Answer:
 
 def record(arguments: argparse.Namespace) -> Answer:
     """`record`: drive every manoeuvre, and lanes where pictures are wanted, and write the log."""
+    if arguments.seconds is None:
+        arguments.seconds = api.Wanted.seconds
+    elif arguments.commands is not None:
+        raise InputError("--seconds: is for manoeuvres, and a table of --commands has its own; leave it out")
     bounds = {"repeats": (1, MOST_REPEATS), "seconds": (5, 600), "frames": (0, MOST_FRAMES), "seed": (0, math.inf)}
     for name, (low, high) in bounds.items():
         if not low <= (given := getattr(arguments, name)) <= high:

@@ -91,6 +91,14 @@ FORMS: Mapping[Callable[[Path], object], Callable[[Path, Wanted], Source]] = {
     is_csv_tables: read_csv_tables,
 }
 """What tells a form that recordings come in, and what reads it; from the surest to what takes any text."""
+ONLY_FOR: Mapping[str, tuple[str, str, Sequence[object]]] = {
+    "vesc": ("--vesc", "bags", (read_bag,)),
+    "stamps": ("--stamps", "bags", (read_bag,)),
+    "poses": ("--poses", "bags and MRCLAM", (read_bag, read_mrclam)),
+    "frames": ("--pictures", "bags and .npz", (read_bag, read_arrays)),
+    "columns": ("--columns", "tables and arrays", (read_arrays, read_tum, read_csv_tables)),
+}
+"""What of Wanted is not for every form: its option, what that is for, and what reads it."""
 KNOWN = "a ROS bag (.bag, .db3, .mcap or a folder of them), CSV, TUM or MRCLAM files, or arrays (.npz)"
 
 
@@ -107,6 +115,9 @@ def read_source(path: Path, wanted: Wanted, offset_s: float = 0.0) -> Source:
     read = next((read for recognise, read in FORMS.items() if recognise(path)), None)
     if read is None:
         raise LogError(f"{path}: is no recording that is known; give {KNOWN}")
+    for name, (option, forms, readers) in ONLY_FOR.items():
+        if read not in readers and getattr(wanted, name) not in (getattr(NOTHING, name), "none"):
+            raise LogError(f"{path}: {option} is for {forms}; leave it out")
     source = read(path, wanted)
     drives, notes = [], list(source.notes)
     for drive in source.drives:

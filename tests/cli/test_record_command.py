@@ -18,8 +18,13 @@ def words(tmp_path, monkeypatch):
     monkeypatch.setattr(filming, "SHORTEST_S", 0.5)
     (tmp_path / "model.toml").write_text(MODEL)
     (tmp_path / "study.toml").write_bytes((shipped("studies") / "quickstart" / "study.toml").read_bytes())
-    base = ("record", tmp_path, "--model", tmp_path / "model.toml", "--repeats", "1", "--seconds", "5", "--output")
-    return lambda name, *options: (*base, tmp_path / name, *options)
+    base = ("record", tmp_path, "--model", tmp_path / "model.toml", "--repeats", "1", "--output")
+
+    def spoken(name, *options):
+        length = () if "--commands" in options else ("--seconds", "5")
+        return (*base, tmp_path / name, *length, *options)
+
+    return spoken
 
 
 @pytest.fixture
@@ -132,3 +137,8 @@ def test_a_table_that_cannot_be_driven_is_refused_in_one_line(words, refused, tm
     (tmp_path / "commands.csv").write_text(table)
     assert said in refused(*words("log", "--commands", tmp_path / "commands.csv"))
     assert not (tmp_path / "log").exists()
+
+
+def test_a_length_is_not_given_to_drives_of_a_table_which_have_their_own(words, refused, tmp_path):
+    told = refused(*words("log", "--commands", tmp_path / "commands.csv", "--seconds", "5"))
+    assert "--seconds: is for manoeuvres" in told

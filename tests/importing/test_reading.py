@@ -80,6 +80,20 @@ def test_what_is_no_recording_is_refused_in_one_line(tmp_path, name, content, sa
     assert says in complaint_of(opened, path)
 
 
+@pytest.mark.parametrize(
+    ("form", "wanted", "says"),
+    [
+        ("csv", {"vesc": Path("/nonexistent")}, "--vesc is for bags; leave it out"),
+        ("csv", {"stamps": "receive"}, "--stamps is for bags"),
+        ("tum", {"frames": "camera"}, "--pictures is for bags and .npz"),
+        ("tum", {"poses": "/pose"}, "--poses is for bags and MRCLAM"),
+    ],
+)
+def test_what_says_nothing_of_a_form_is_refused_with_what_it_is_for(forms, form, wanted, says):
+    assert says in complaint_of(read_source, forms[form], Wanted(**wanted))
+    read_source(forms["csv"], Wanted(frames="none", poses="none"))
+
+
 def test_a_clock_offset_given_with_it_is_declared_as_the_complaint_of_clocks_an_hour_apart_asks_for(forms, tmp_path):
     facts = Facts(robot="nobodys", figures=foreign_robot.FIGURES, clock_offset="0.1")
     with open_log(forms["csv"], Wanted(), facts) as (log, _):

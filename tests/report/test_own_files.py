@@ -236,6 +236,10 @@ def test_what_would_overwrite_or_misread_the_users_own_is_refused(model, tmp_pat
     assert "mine.urdf: is read by this command, and would be lost" in told
     assert "model.toml: is read by this command" in complaint_of(lambda: export(model, model, to="ros"))
     assert "--to urf: no such format; did you mean 'urdf'?" in complaint_of(lambda: export(model, "o", to="urf"))
+    for to in ("urdf", "optuna"):
+        assert "--has: is for --to filter; leave" in complaint_of(export, model, "o", to=to, has=("trim",))
+        assert "--wheels: is for --into FILE" in complaint_of(export, model, "o", to=to, wheels=("a", "b"))
+    assert "--has: is for --to filter" in complaint_of(export, model, "o", into=tmp_path / "mine.urdf", has="trim")
     told = complaint_of(lambda: CommandFilter(model, rate_hz=HZ, has="trimm"))
     assert told == "has=trimm: no such effect; did you mean 'trim'?"
     assert "two finite numbers" in complaint_of(CommandFilter(model, rate_hz=HZ).step, (np.nan, 0.0))

@@ -23,6 +23,9 @@ from typing import Any
 
 from proxytune.errors import InputError, ProxytuneError, RunError, SettingsError
 
+OF_FOLDERS = (".toml", ".db", ".py")
+"""What a study or a robot is read from by its folder: settings, its database and modules."""
+
 
 def check_place(path: Path, *, folder: bool = False, ours: bool = False, inputs: Iterable[str | Path] = ()) -> None:
     """Refuse a file or folder that cannot be written, before the work begins that ends there.
@@ -31,13 +34,15 @@ def check_place(path: Path, *, folder: bool = False, ours: bool = False, inputs:
         path: The file or folder; it, and folders on the way, need not be there.
         folder: Whether it is a folder.
         ours: Whether its name is ours, in a folder that the user has given.
-        inputs: What the work reads.
+        inputs: What the work reads; a folder stands for the settings, databases and modules in it.
 
     Raises:
         InputError: If something else or an input is there, or nothing may be written there.
     """
     whole = path.absolute()
-    if path.exists() and any(Path(one).exists() and path.samefile(one) for one in inputs):
+    read = list(map(Path, inputs))
+    read += [one / path.name for one in read] if path.suffix in OF_FOLDERS else []
+    if path.exists() and any(file.exists() and path.samefile(file) for file in read):
         raise InputError(f"{path}: is read by this command, and would be lost; give another name")
     there = next(place for place in (whole, *whole.parents) if os.path.lexists(place))
     if there == whole and there.exists() and not (there.is_dir() if folder else there.is_file()):

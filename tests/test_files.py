@@ -38,6 +38,16 @@ def test_a_place_is_free_where_a_file_or_folder_may_come_to_be(tmp_path):
             check_place(tmp_path / name, inputs=("gone.csv", tmp_path / "old.csv"))
 
 
+def test_settings_databases_and_modules_of_a_folder_that_is_read_are_kept_and_results_in_it_may_be_replaced(tmp_path):
+    for name in ("study.toml", "study.db", "grey.py"):
+        (tmp_path / name).touch()
+        told = complaint_of(check_place, tmp_path / "." / name, inputs=("old.csv", tmp_path))
+        assert f"{name}: is read by this command" in told
+    (tmp_path / "found.urdf").touch()
+    for name in ("found.urdf", "target.csv", "new.py"):
+        check_place(tmp_path / name, inputs=(tmp_path,))
+
+
 def test_a_text_with_bytes_that_are_no_utf_8_is_written_with_these_spelt_out(tmp_path):
     write_whole(tmp_path / "page.html", "caf\udcff é")
     assert (tmp_path / "page.html").read_text("utf-8") == "caf\\udcff é"

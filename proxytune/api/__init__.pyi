@@ -6,7 +6,13 @@ from .driving import (
     drive as drive,
     read_theta as read_theta,
 )
-from .exporting import TRIALS as TRIALS, CommandFilter as CommandFilter, ExportReport as ExportReport, export as export
+from .exporting import (
+    TRIALS as TRIALS,
+    CommandFilter as CommandFilter,
+    ExportReport as ExportReport,
+    export as export,
+    robot_files as robot_files,
+)
 from .families import (
     FamiliesReport as FamiliesReport,
     read_families as read_families,

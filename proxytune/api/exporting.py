@@ -101,12 +101,13 @@ def export(
         raise InputError("--has: is for --to filter; leave it out")
     if wheels and into is None:
         raise InputError("--wheels: is for --into FILE; leave it out")
-    check_place(file, inputs=filter(None, (path, into)))
+    check_place(file, inputs=filter(None, (path, into, *path.glob("*.csv"))))
     if to in TRIALS:
         return _export_trials(path, file, to)
     if to and to not in (report.FILTER, *WRITERS):
         raise InputError(f"--to {to}: no such format; {nearest(to, (report.FILTER, *WRITERS, *TRIALS))}")
     instance, cautions = _instance_of(path)
+    check_place(file, inputs=robot_files(instance.robot.name, instance.robot.catalogue.folder))
     told: dict[str, Any] = {"robot": instance.robot.name, "cautions": list(cautions)}
     if into is not None:
         given = Path(into)
@@ -121,6 +122,13 @@ def export(
         text, lines = WRITERS[to](instance), report.export_lines(instance, to)
     report.write_text(file, text)
     return ExportReport(file, to, lines, told)
+
+
+def robot_files(name: str, folder: Path | None) -> tuple[Path, ...]:
+    """The folder and the body that a robot is read from; none where it is unknown."""
+    if not driving.is_robot(name, folder):
+        return ()
+    return tuple(filter(None, (driving.robot_home(name, folder), driving.read_robot(name, folder).urdf)))
 
 
 def _names_of(has: str | Sequence[str], catalogue: Catalogue, what: str) -> tuple[str, ...]:

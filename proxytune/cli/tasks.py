@@ -2,6 +2,7 @@
 
 import argparse
 import math
+from pathlib import Path
 
 from rich.console import Group
 from rich.text import Text
@@ -13,6 +14,7 @@ from proxytune.cli.terminal import Answer, waiting
 from proxytune.errors import InputError
 from proxytune.files import check_place
 from proxytune.importing import Survey
+from proxytune.settings import read_settings
 from proxytune.study import FILE_NAME, read_study_settings
 
 MOST_FRAMES = 1_000_000
@@ -61,7 +63,8 @@ def fleet(arguments: argparse.Namespace) -> Answer:
 
 def measure(arguments: argparse.Namespace) -> Answer:
     """`measure`: score a study's agents from every start in the domain of a model file, and write the table."""
-    check_place(arguments.output, inputs=(arguments.model, arguments.path, arguments.path / FILE_NAME))
+    folder = arguments.path.parent if arguments.path.name == FILE_NAME else arguments.path
+    check_place(arguments.output, inputs=(folder, *_files_of(arguments.model, folder)))
     found = api.measure(arguments.path, arguments.model, repeats=arguments.repeats, seed=arguments.seed, progress=True)
     found.write(arguments.output)
     document = {"scores": str(arguments.output), **found.document()}
@@ -70,6 +73,12 @@ def measure(arguments: argparse.Namespace) -> Answer:
     rows = tuple((str(agent), *(f"{value:.3f}" for value in own)) for agent, own in means)
     heads = report.columns_of(("agent",), [report.plain(name) for name in found.scores.metrics])
     return Answer(document, Group(report.table_text(report.Table("", heads, rows)), Text("\n".join(lines))))
+
+
+def _files_of(model: Path, folder: Path) -> tuple[Path, ...]:
+    """A model, and what the robot that it names is read from."""
+    named = str(read_settings(model).values.get("robot")) if model.is_file() else ""
+    return (model, *api.robot_files(named, folder))
 
 
 def record(arguments: argparse.Namespace) -> Answer:
@@ -133,7 +142,7 @@ def predict(arguments: argparse.Namespace) -> Answer:
     """`predict`: predict the poses of a log, or its pictures, by a model, and compare them with those measured."""
     folder = arguments.output if arguments.frames else None
     log = (arguments.log, *(arguments.log / f"{name}.csv" for name in ("samples", "commands", "frames")))
-    check_place(arguments.output, folder=arguments.frames, inputs=(arguments.model, *log))
+    check_place(arguments.output, folder=arguments.frames, inputs=(*log, *_files_of(arguments.model, Path.cwd())))
     chosen = {"horizon_s": arguments.horizon, "wanted": wanted_of(arguments), "facts": facts_of(arguments)}
     with waiting("predicting") as tell:
         found = api.predict(arguments.model, arguments.log, frames=folder, tell=tell, **chosen)

@@ -1,5 +1,8 @@
+import shutil
+
 import pytest
 
+from proxytune.files import shipped
 from proxytune.scores import read_scores
 
 
@@ -36,6 +39,21 @@ def test_a_target_is_the_same_byte_for_byte_named_by_its_seed_and_fit_for_a_stud
     document = answered(*words("one.csv"))
     assert (document["seed"], document["episodes"]) == (1001, 3)
     assert set(document["means"]["agent0"]) == {"distance", "survival_time"}
+
+
+def test_the_study_and_the_robot_of_the_model_are_kept_and_an_earlier_target_is_replaced(
+    make_study, tmp_path, refused, answered
+):
+    shutil.copytree(shipped("robots") / "duckiebot", tmp_path / "duckiebot")
+    folder, model = make_study(), tmp_path / "model.toml"
+    model.write_text('trim = 0.1\nrobot = "duckiebot"\n')
+    (folder / "study.db").touch()
+    for kept in (folder / "study.db", folder / "study.toml", tmp_path / "duckiebot" / "robot.toml"):
+        for study in (folder, folder / "study.toml"):
+            told = refused("measure", study, "--model", model, "--output", kept)
+            assert f"{kept.name}: is read by this command, and would be lost" in told
+    model.write_text("trim = 0.1\n")
+    answered("measure", folder, "--model", model, "--output", folder / "target.csv")
 
 
 def test_repeats_are_labelled_and_one_gives_the_table_of_none_asked_for(measured, words, answered, tmp_path):

@@ -108,6 +108,7 @@ BAD = {
     "an endless horizon": (["{model}", "{log}", "--horizon", "inf"], "--horizon must be a positive number"),
     "its own model": (["{model}", "{log}", "--output", "{model}"], "is read by this command, and would be lost"),
     "its own log": (["{model}", "{log}", "--output", "{log}/samples.csv"], "is read by this command"),
+    "its log's settings": (["{model}", "{log}", "--output", "{log}/log.toml"], "is read by this command"),
     "its own frames": (["{model}", "{log}", "--frames", "--output", "{log}"], "is read by this command"),
     "a bag's option for a log": (["{model}", "{log}", "--clock-offset", "5"], "is a log already"),
     "a horizon shorter than a sample": (["{model}", "{log}", "--horizon", "0.01"], "shorter than a sample"),

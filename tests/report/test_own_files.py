@@ -1,6 +1,7 @@
 """A user's own URDF, SDF or MuJoCo model, patched, with the filter before it, moves as the model that was found."""
 
 import re
+import shutil
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
@@ -13,7 +14,7 @@ from ros_stubs import Ackermann, Stamped, Twist, load_node
 
 from proxytune import CommandFilter, export
 from proxytune.cli.main import main
-from proxytune.driving import drivetrain, link_pose, parse_urdf, read_robot, rotation
+from proxytune.driving import drivetrain, link_pose, parse_urdf, read_robot, robot_home, rotation
 from proxytune.driving.plants import PlanarPlant
 from proxytune.effects import FilterContext, Model, effects_from, model_text
 from proxytune.report.export.instance import IN_WHEELS
@@ -237,12 +238,25 @@ def test_what_would_overwrite_or_misread_the_users_own_is_refused(model, tmp_pat
     assert "model.toml: is read by this command" in complaint_of(lambda: export(model, model, to="ros"))
     assert "--to urf: no such format; did you mean 'urdf'?" in complaint_of(lambda: export(model, "o", to="urf"))
     for to in ("urdf", "optuna"):
-        assert "--has: is for --to filter; leave" in complaint_of(export, model, "o", to=to, has=("trim",))
-        assert "--wheels: is for --into FILE" in complaint_of(export, model, "o", to=to, wheels=("a", "b"))
-    assert "--has: is for --to filter" in complaint_of(export, model, "o", into=tmp_path / "mine.urdf", has="trim")
+        assert "--has: is for --to filter; leave" in complaint_of(export, model, tmp_path / "o", to=to, has=("trim",))
+        assert "--wheels: is for --into FILE" in complaint_of(export, model, tmp_path / "o", to=to, wheels="ab")
+    assert "--has: is for --to filter" in complaint_of(export, model, tmp_path / "o", into=model, has="trim")
     told = complaint_of(lambda: CommandFilter(model, rate_hz=HZ, has="trimm"))
     assert told == "has=trimm: no such effect; did you mean 'trim'?"
     assert "two finite numbers" in complaint_of(CommandFilter(model, rate_hz=HZ).step, (np.nan, 0.0))
+
+
+def test_the_files_of_the_robot_are_kept_and_an_earlier_export_beside_them_is_replaced(
+    tmp_path, monkeypatch, write_file
+):
+    monkeypatch.chdir(tmp_path)
+    shutil.copytree(robot_home("duckiebot"), tmp_path / "duckiebot")
+    model = write_file(model_text(Model("duckiebot", None, FOUND, {})), "model.toml")
+    for kept in (tmp_path / "duckiebot" / "robot.toml", read_robot("duckiebot", tmp_path).body()):
+        told = complaint_of(export, model, kept, to="urdf")
+        assert f"{kept.name}: is read by this command, and would be lost" in told
+    for _ in range(2):
+        assert "<robot" in export(model, tmp_path / "duckiebot" / "found.urdf", to="urdf").output.read_text()
 
 
 @pytest.mark.parametrize("stamped", [False, True])

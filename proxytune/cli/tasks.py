@@ -2,6 +2,7 @@
 
 import argparse
 import math
+import shlex
 from pathlib import Path
 
 from rich.console import Group
@@ -172,6 +173,8 @@ def export(arguments: argparse.Namespace) -> Answer:
     if arguments.into is None:
         return Answer(found.document(), said)
     diff = found.facts["diff"] or f"{arguments.into}: nothing in it has to change\n"
-    rest = f"--to filter --has {','.join(report.IN_WHEELS)} --output cmd_vel_filter.py"
-    then = f"the filter for the rest: proxytune export {arguments.model} {rest}"
-    return Answer(found.document(), Group(Text(diff, no_wrap=True, overflow="ignore"), said, Text(then)))
+    rest = ("--to", "filter", "--has", ",".join(report.IN_WHEELS), "--output", "cmd_vel_filter.py")
+    own = ("--effects", arguments.effects) if arguments.effects else ()
+    then = f"the filter for the rest: {shlex.join(('proxytune', 'export', str(arguments.model), *own, *rest))}"
+    above, below = (Text(text, no_wrap=True, overflow="ignore") for text in (diff, then))
+    return Answer(found.document(), Group(above, said, below))

@@ -1,6 +1,7 @@
 """A user's own URDF, SDF or MuJoCo model, patched, with the filter before it, moves as the model that was found."""
 
 import re
+import shlex
 import shutil
 import xml.etree.ElementTree as ET
 from pathlib import Path
@@ -339,11 +340,19 @@ def test_the_python_of_the_page_runs(tmp_path, monkeypatch):
     exec(PAGE.read_text(encoding="utf-8").split("```python")[1].split("```")[0], {})
 
 
-def test_the_command_shows_the_diff_and_how_to_make_the_filter(model, tmp_path, capsys, refused):
+def test_the_command_shows_the_diff_and_how_to_make_the_filter_to_be_pasted_as_it_is(
+    model, tmp_path, capsys, refused, monkeypatch
+):
+    model = model.rename(tmp_path / "the model.toml")
+    monkeypatch.setenv("FORCE_COLOR", "1")
+    monkeypatch.setenv("COLUMNS", "60")
     (tmp_path / "mine.urdf").write_text(URDF)
     given = ["export", str(model), "--into", str(tmp_path / "mine.urdf"), "--output", str(tmp_path / "found.urdf")]
-    assert main(given) == 0
+    assert main([*given, "--effects", "tyre:Grip, sag:Sag"]) == 0
     told = capsys.readouterr().out
     assert """+  <link name="wheel_l"><collision><geometry><cylinder radius="0.02566""" in told
-    assert "--to filter --has trim,wheel_gain,yaw_scrub --output" in " ".join(told.split())
+    then = next(line for line in told.splitlines() if "the filter for the rest: " in line)
+    words = shlex.split(then.partition("rest: ")[2])
+    told = "--effects", "tyre:Grip, sag:Sag", "--to", "filter", "--has", "trim,wheel_gain,yaw_scrub", "--output"
+    assert words == ["proxytune", "export", str(model), *told, "cmd_vel_filter.py"]
     assert "give either --to FORMAT" in refused(*given, "--to", "urdf")

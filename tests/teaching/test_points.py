@@ -307,6 +307,24 @@ def test_what_the_machine_lacks_is_no_failure_of_the_learner(tmp_path, ending):
     assert not isinstance(found.value, EpisodeError)
 
 
+@dataclass(frozen=True)
+class Odd(Matrix):
+    """Its weights are none."""
+
+    weights: object = None
+
+    def train(self, samples, start, seed):
+        return self.weights
+
+
+@pytest.mark.parametrize("weights", [[1, 2], None, {"w": object()}, {3: np.zeros(2)}], ids=repr)
+def test_weights_that_are_no_arrays_by_name_are_refused_by_the_learners_name(tmp_path, weights):
+    one = setup(tmp_path, learner=Odd(weights=weights))
+    told = f"none: train of '{one.settings.learner}' returned no arrays of numbers by name; return a dict of such"
+    assert complaint_of(one.score, ALONE) == told
+    assert not list(tmp_path.glob("weights-*"))
+
+
 class Silly(Schoolroom):
     """Its scores are none."""
 

@@ -339,7 +339,9 @@ def gather_views(log: Log, frames: Frames, robot: Robot) -> Gathered:
     showing = int((np.bincount(edges.frame, minlength=len(numbers)) >= FEWEST_POINTS).sum())
     if showing < FEWEST_FRAMES:
         problem = f"{showing} of {len(numbers)} frames show markings; the camera needs {FEWEST_FRAMES}"
-        raise LogError(f"{log.name}: frames: {problem}: drive nearer to the lines, or check the map")
+        few = len(numbers) < FEWEST_FRAMES
+        remedy = "take more that show them" if few else "drive nearer to the lines, or check the map"
+        raise LogError(f"{log.name}: frames: {problem}: {remedy}")
     edges = edges.only(np.arange(len(edges.row)) % EVERY == 0)
     optics = Optics(robot, *pictures.shape[1:3])
     position_m = tracks.share * (ASSUMED_M if frames.position_m is None else frames.position_m)

@@ -316,6 +316,13 @@ def test_too_few_markings_are_refused_and_of_many_frames_some_spread_evenly_with
     assert set(np.diff(numbers)) <= {1, 2}
 
 
+def test_of_fewer_frames_than_a_camera_needs_more_are_to_be_taken_however_well_they_show_the_lines(log):
+    own = log.frames
+    few = replace(own, paths=own.paths[:19], drives=own.drives[:19], times=own.times[:19])
+    problem = "19 of 19 frames show markings; the camera needs 20: take more that show them"
+    assert complaint_of(gather_views, log, few, ROBOT) == f"{log.name}: frames: {problem}"
+
+
 def test_a_robot_without_a_camera_is_refused_beforehand_and_a_map_is_a_shipped_one_or_a_file(log):
     geometry = {"wheel_radius": 0.03, "effective_baseline": 0.16, "full_speed": 0.6}
     frames = replace(log.frames, paths=(Path("nowhere.png"),) * COUNT)

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
-from PIL import Image
+from PIL import ExifTags, Image, ImageOps
 
 from proxytune.arrays import Floats, Whole
 from proxytune.errors import LogError
@@ -156,8 +156,8 @@ def _read_instants(path: Path, samples: Rows, episodes: Sequence[LogEpisode]) ->
 
 
 Pictures = NDArray[np.uint8]
-BROKEN = (OSError, SyntaxError, ValueError, EOFError, struct.error, zlib.error, Image.DecompressionBombError)
-"""What Pillow raises at files that are cut off or damaged."""
+BROKEN = (OSError, SyntaxError, ValueError, TypeError, EOFError, struct.error, zlib.error, Image.DecompressionBombError)
+"""What Pillow raises at files that are cut off or damaged; of their EXIF TypeError."""
 
 
 def read_pictures(frames: Frames, numbers: Sequence[int], columns: int = 160) -> Pictures:
@@ -181,16 +181,19 @@ def read_pictures(frames: Frames, numbers: Sequence[int], columns: int = 160) ->
 
 
 def _read_picture(path: Path, columns: int) -> tuple[Pictures, tuple[int, int]]:
-    """A picture averaged down, and the width and height of its file."""
+    """A picture averaged down, and its whole width and height; turned as its file says that it is to be shown."""
     try:
         with open_picture(path, path, ("PNG", "JPEG")) as image:
-            size = image.size
+            lies = image.getexif().get(ExifTags.Base.Orientation, 1) in (5, 6, 7, 8)
+            size = image.size[::-1] if lies else image.size
             if image.mode.startswith(("I", "F")):
                 raise LogError(f"{path}: has more than 8 bits a pixel; save it with 8 bits for each colour")
             (width, height), wanted = size, size
             if width > columns:
                 wanted = columns, max(1, round(height * columns / width))
-            image.draft(None, (2 * wanted[0], 2 * wanted[1]))  # Half of what a JPEG averages is left to the box
+            # Half of what a JPEG averages is left to the box
+            image.draft(None, (2 * wanted[lies], 2 * wanted[not lies]))
+            ImageOps.exif_transpose(image, in_place=True)
             whole = image.convert("RGB")
     except FileNotFoundError:
         raise LogError(f"{path}: no such file; add the picture") from None

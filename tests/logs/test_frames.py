@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 from log_folders import complaint, write_files
 from one_line import complaint_of
-from PIL import Image
+from PIL import ExifTags, Image
 
 from proxytune.api import log_of
 from proxytune.logs import Frames, read_log, read_pictures
@@ -227,6 +227,15 @@ def test_pictures_of_two_sizes_of_sixteen_bits_or_gone_are_refused(frames_of, fo
     assert complaint_of(read_pictures, frames, [0]) == f"{frames.paths[0]}: no such file; add the picture"
     remedy = "add them, or name those that there are in frames.csv"
     assert complaint(folder(pictures=(7,))) == f"/frames/0009.jpg: no such picture, 2 of 3 are missing; {remedy}"
+
+
+@pytest.mark.parametrize("ending", ["png", "jpg"])
+@pytest.mark.parametrize(("stored", "orientation"), [(np.rot90, 6), (lambda shown: shown[::-1, ::-1], 3)])
+def test_a_picture_is_read_as_its_orientation_says_that_it_is_to_be_shown(frames_of, ending, stored, orientation):
+    exif = Image.Exif()
+    exif[ExifTags.Base.Orientation] = orientation
+    turned = read_pictures(frames_of(np.ascontiguousarray(stored(LARGE)), ending=ending, exif=exif), [0])
+    np.testing.assert_allclose(turned, read_pictures(frames_of(LARGE, ending=ending), [0]), atol=10.0)
 
 
 @pytest.mark.parametrize("ending", ["png", "jpg"])

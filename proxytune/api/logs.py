@@ -38,6 +38,14 @@ def recordable(settings: StudySettings, model: Path) -> LaneFollowing:
     return family
 
 
+def check_no_more_pictures(folder: Path, count: int) -> None:
+    """Refuse the folder of so many pictures if it has more: those of an earlier, longer run would stay among them."""
+    more = [path for path in folder.glob("frames/*.png") if path.stem.isdecimal() and int(path.stem) >= count]
+    if more:
+        remedy = f"give another folder, or remove {more[0].parent}"
+        raise InputError(f"{min(more)}: is of an earlier, longer run, and there are now {count} pictures; {remedy}")
+
+
 def record_log(
     settings: StudySettings, model: Path, folder: Path, wanted: Wanted, tell: Tell
 ) -> tuple[Log, tuple[str, ...]]:
@@ -47,11 +55,12 @@ def record_log(
         The log, and what is probably not meant in its domain or itself, a sentence each.
 
     Raises:
-        InputError: If the domain cannot be recorded, its robot cannot do what a table says, or it has no camera or
-            expert where pictures are wanted.
+        InputError: If the domain cannot be recorded, its robot cannot do what a table says, it has no camera or expert
+            where pictures are wanted, or the folder has more pictures than those.
         EpisodeError: If a lane drive ends before its pictures are taken.
         RunError: If a file cannot be written.
     """
+    check_no_more_pictures(folder, wanted.frames)
     family = recordable(settings, model)
     drives = film(family, wanted.frames, wanted.seed) if wanted.frames else ()
     table = None if wanted.commands is None else (str(wanted.commands), *read_commands(wanted.commands))

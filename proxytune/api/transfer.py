@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 
 from proxytune import diagnosis
+from proxytune.api.logs import check_no_more_pictures
 from proxytune.driving import Robot, catalogue_of, is_robot, read_model_of, read_robot, robot_from_geometry
 from proxytune.effects import Catalogue, Model
 from proxytune.errors import InputError, LogError
@@ -282,7 +283,7 @@ def predict(
         tell: Hears how many pictures are drawn.
 
     Raises:
-        InputError: If the model or the log cannot be used.
+        InputError: If the model or the log cannot be used, or the folder has more pictures than the log.
         RunError: If a picture cannot be written.
     """
     if not (np.isfinite(horizon_s) and horizon_s > 0.0):
@@ -295,6 +296,7 @@ def predict(
     with open_log(log, wanted or Wanted(), named) as (drives, _):
         if frames is not None:
             folder = Path(frames)
+            check_no_more_pictures(folder, len(diagnosis.frames_of(drives).paths))
             numbers, errors = list[int](), list[float]()
             for part in diagnosis.predict_pictures(drives, _robot_of(fitted, drives, catalogue), fitted.theta):
                 for number, picture in zip(part.numbers.tolist(), part.pictures, strict=True):

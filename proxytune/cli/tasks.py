@@ -144,14 +144,17 @@ def predict(arguments: argparse.Namespace) -> Answer:
     folder = arguments.output if arguments.frames else None
     log = (arguments.log, *(arguments.log / f"{name}.csv" for name in ("samples", "commands", "frames")))
     check_place(arguments.output, folder=arguments.frames, inputs=(*log, *_files_of(arguments.model, Path.cwd())))
-    chosen = {"horizon_s": arguments.horizon, "wanted": wanted_of(arguments), "facts": facts_of(arguments)}
+    if arguments.frames and arguments.horizon is not None:
+        raise InputError("--horizon: is for poses, and --frames predicts pictures instead; leave one of the two out")
+    horizon = 2.0 if arguments.horizon is None else arguments.horizon
+    chosen = {"horizon_s": horizon, "wanted": wanted_of(arguments), "facts": facts_of(arguments)}
     with waiting("predicting") as tell:
         found = api.predict(arguments.model, arguments.log, frames=folder, tell=tell, **chosen)
     if isinstance(found, api.PicturePrediction):
         return Answer(found.document(), Text(f"{found.sentence}\n{arguments.output}"))
     report.write_text(arguments.output, found.poses.to_csv(index=False))
     count = found.error.windows or len(found.poses.groupby(["episode", "start_time"]))
-    windows = f"{count} windows of {arguments.horizon:g} s"
+    windows = f"{count} windows of {horizon:g} s"
     document = {"predictions": str(arguments.output), **found.document()}
     cautions = [f"beware: {line}" for line in found.cautions]
     lines = [*cautions, *found.notes, f"{windows}: {found.sentence}", str(arguments.output)]

@@ -110,6 +110,7 @@ BAD = {
     "its own log": (["{model}", "{log}", "--output", "{log}/samples.csv"], "is read by this command"),
     "its log's settings": (["{model}", "{log}", "--output", "{log}/log.toml"], "is read by this command"),
     "its own frames": (["{model}", "{log}", "--frames", "--output", "{log}"], "is read by this command"),
+    "a horizon of pictures": (["{model}", "{log}", "--frames", "--horizon", "2"], "--horizon: is for poses"),
     "a bag's option for a log": (["{model}", "{log}", "--clock-offset", "5"], "is a log already"),
     "a horizon shorter than a sample": (["{model}", "{log}", "--horizon", "0.01"], "shorter than a sample"),
 }

@@ -51,6 +51,18 @@ def test_the_true_model_draws_the_very_pictures_the_nominal_others_and_both_read
     assert np.array_equal(frames.times, own.times)
 
 
+def test_pictures_of_an_earlier_longer_run_are_left_alone_and_none_is_drawn_among_them(stills, tmp_path, refused):
+    drawn = tmp_path / "out" / "frames"
+    drawn.mkdir(parents=True)
+    for name in ("000064.png", "000065.png", "000066.png", "mine.png"):
+        (drawn / name).touch()
+    line = refused("predict", model(tmp_path, ROLLED), stills, "--frames", "--output", tmp_path / "out")
+    problem = "is of an earlier, longer run, and there are now 65 pictures"
+    assert line.strip().endswith(f"{drawn / '000065.png'}: {problem}; give another folder, or remove {drawn}")
+    assert len(list(drawn.iterdir())) == 4
+    assert not (drawn / "000064.png").stat().st_size
+
+
 def test_logs_without_frames_or_commands_are_refused_and_people_read_differences_in_grey(
     tmp_path, refused, stills, capsys
 ):

@@ -102,6 +102,15 @@ def test_a_picture_that_cannot_be_written_leaves_no_log(recorded, words, capsys)
     assert not (home / "log.toml").exists()
 
 
+@pytest.mark.parametrize("frames", [0, 2])
+def test_a_recording_begun_again_with_fewer_pictures_is_refused(recorded, words, refused, frames):
+    home = recorded("log", "--frames", "3")
+    (home / "log.toml").unlink()
+    line = refused(*words("log", "--frames", str(frames)))
+    assert f"00000{frames}.png: is of an earlier, longer run, and there are now {frames} pictures; give another" in line
+    assert not (home / "log.toml").exists()
+
+
 @pytest.mark.parametrize("kind", ["duty", "twist"])
 def test_a_table_of_commands_is_driven_as_it_is(recorded, tmp_path, kind):
     duties = np.repeat([[0.2, 0.4], [0.5, 0.5], [-0.1, 0.1]], 20, axis=0)

@@ -50,6 +50,9 @@ def best_theta(study: Study, option: str = "--at") -> Theta:
     """The best θ that the study has found so far; the option that asks for it is named in complaints."""
     if not has_answer(study):
         folder = study.settings.home
+        if study.settings.objective == LEARNING:
+            found = f"is a study of '{LEARNING}', which tells its best teacher in report.html and no best θ"
+            raise InputError(f"{folder}: {found}; give θ itself: {option} NAME=VALUE,NAME=VALUE")
         raise InputError(f"{folder}: has no finished trial; run it first (python -m proxytune study {folder})")
     with Store.read(study.settings.home) as store:
         try:

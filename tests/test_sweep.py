@@ -294,3 +294,11 @@ def test_the_mirror_image_of_a_curve_has_mirrored_sides(scores, data):
     other = sweep.shape_of(series(scores[::-1], 0.5), float(len(scores) - 1 - held))
     upside_down = sweep.shape_of(series([-score for score in scores], 0.5, higher=True), float(held))
     assert (one.below, one.above) == (other.above, other.below) == (upside_down.below, upside_down.above)
+
+
+@pytest.mark.parametrize("option", ["--at", "--theta"])
+def test_a_study_of_plv_has_no_best_theta_and_running_it_is_no_remedy(make_study, option):
+    folder = make_study(objective='"plv"')
+    told = complaint_of(sweep.best_theta, open_study(folder), option)
+    problem = "is a study of 'plv', which tells its best teacher in report.html and no best θ"
+    assert told == f"{folder}: {problem}; give θ itself: {option} NAME=VALUE,NAME=VALUE"

@@ -146,6 +146,17 @@ def test_ros_parameters_are_those_that_make_the_robot_go_as_told():
     assert nodes["camera_transform"]["ros__parameters"]["translation.z"] == pytest.approx(0.108)
 
 
+def test_ros_intrinsics_for_more_pixels_are_those_that_the_file_says_to_make_of_them():
+    yaml, found, s = pytest.importorskip("yaml"), instance(lens_centre__right=0.05), 4
+    sizes = ("camera_columns", "camera_rows")
+    larger = ROBOT.figures | {name: s * ROBOT.figures[name] for name in sizes}
+    texts = [ros_text(one) for one in (found, replace(found, robot=replace(ROBOT, figures=larger)))]
+    assert "focal lengths s times as large, and a centre c at (c + 0.5) * s - 0.5." in texts[0]
+    k, wanted = (yaml.safe_load(text)["camera"]["ros__parameters"]["camera_info.k"] for text in texts)
+    made = [s * k[0], 0.0, (k[2] + 0.5) * s - 0.5, 0.0, s * k[4], (k[5] + 0.5) * s - 0.5, 0.0, 0.0, 1.0]
+    assert made == pytest.approx(wanted, abs=1e-5)
+
+
 def with_urdf(folder, *changes):
     """The Duckiebot with changes of its URDF."""
     text = ROBOT.urdf.read_text()

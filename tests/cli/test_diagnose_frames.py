@@ -63,7 +63,7 @@ def test_a_roll_that_nobody_declared_is_found_in_still_frames_and_the_document_s
     assert set(camera) >= KEYS
     (effect,) = camera["effects"]
     assert (camera["verdict"], effect["name"]) == ("explained", "camera_roll")
-    assert set(effect) == {"name", "parameters", "held_out_gain", "indistinguishable_from", "error_without"}
+    assert set(effect) == {"name", "parameters", "held_out_gain", "indistinguishable_from", "error_without", "at_edge"}
     low, high = effect["parameters"]["camera_roll"]["interval"]
     assert low < 4.0 < high < 6.0
     assert effect["error_without"] > 2.0

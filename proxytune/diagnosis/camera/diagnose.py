@@ -19,7 +19,7 @@ from proxytune.diagnosis.camera.edges import DISTORTION, MOVING, READOUT, Gather
 from proxytune.diagnosis.camera.fitting import CameraFit
 from proxytune.diagnosis.stages import Stages, facts_of
 from proxytune.driving import LINES, Robot
-from proxytune.effects import PARAMETERS, Catalogue, Stage, effect_of
+from proxytune.effects import PARAMETERS, SHIPPED, Catalogue, Stage, effect_of
 from proxytune.errors import LogError
 from proxytune.logs import Log
 
@@ -68,12 +68,15 @@ def conclude(
     hidden = effects_of(tuple(name for name in (*unseen, *dark) if effect_of(name) not in changed))
     readout = named.full.theta[READOUT]
     stated = readout > 0.0 and READOUT not in named.full.names
+    theta = _estimates(named.model, (*declared, *named.effects))
+    theta |= {READOUT: Estimate(readout, (readout, readout), PARAMETERS[READOUT].unit)} if stated else {}
+    theta |= _figures(look, (*tuned, *(name for effect in on_look for name in effect.names)))
+    added, optics = (name for effect in effects for name in effect.names if name in theta), gathered.views.optics
+    at_ends = tuple(name for name in added if optics.at_end(name, theta[name].value))
     return error.CameraDiagnosis(
-        verdict=verdict(is_explained(fields[1], look), named=bool(effects)),
+        verdict=verdict(is_explained(fields[1], look) and not at_ends, named=bool(effects)),
         declared=_estimates(named.declared, declared) | _figures(look, tuned),
-        theta=_estimates(named.model, (*declared, *named.effects))
-        | ({READOUT: Estimate(readout, (readout, readout), PARAMETERS[READOUT].unit)} if stated else {})
-        | _figures(look, (*tuned, *(name for effect in on_look for name in effect.names))),
+        theta=theta,
         effects=effects,
         negligible=tuple(_told(weighed, effect) for effect in weighed.dropped),
         dropped=_estimates(weighed.with_dropped, weighed.dropped),
@@ -89,6 +92,7 @@ def conclude(
         notes=tuple(notes),
         named=named,
         gathered=gathered,
+        at_ends=at_ends,
     )
 
 
@@ -137,16 +141,22 @@ def _names(look: Appearance, effects: Sequence[str]) -> tuple[str, ...]:
 
 def _figures(look: Appearance, names: Sequence[str]) -> dict[str, Estimate]:
     values = look_values(look, names)
-    return {name: Estimate(values[name], look.figures[name].interval, PARAMETERS[name].unit) for name in names}
+    return {name: _within(name, Estimate(values[name], look.figures[name].interval, ""), SHIPPED) for name in names}
 
 
 def _estimates(fit: CameraFit, effects: Sequence[str]) -> dict[str, Estimate]:
-    parameters = fit.views.optics.robot.catalogue.parameters
+    catalogue = fit.views.optics.robot.catalogue
     return {
-        name: error.estimate_of(fit.theta[name], sd, parameters[name].unit)
+        name: _within(name, error.estimate_of(fit.theta[name], sd, ""), catalogue)
         for name, sd in zip(fit.names, fit.sd, strict=True)
         if effect_of(name) in effects
     }
+
+
+def _within(name: str, one: Estimate, catalogue: Catalogue) -> Estimate:
+    """An estimate in its parameter's unit, whose interval goes no farther than the parameter's range."""
+    parameter, (low, high) = catalogue.parameters[name], one.interval
+    return Estimate(one.value, (parameter.clipped(low), parameter.clipped(high)), parameter.unit)
 
 
 def camera_effects(catalogue: Catalogue) -> tuple[str, ...]:

@@ -18,6 +18,7 @@ from scipy.ndimage import binary_dilation, gaussian_filter, map_coordinates
 from scipy.signal import savgol_coeffs, savgol_filter
 
 from proxytune.arrays import Flags, Floats
+from proxytune.diagnosis.answer import RULES
 from proxytune.driving import LINES, CameraFigures, Markings, Road, Robot, mounted_camera, read_map, shipped_map
 from proxytune.effects import Stage, effect_of, effects_from
 from proxytune.errors import LogError
@@ -226,6 +227,12 @@ class Optics:
     def clipped(self, name: str, value: float) -> float:
         """The nearest value within the parameter's bounds."""
         return self.robot.catalogue.parameters[name].clipped(value)
+
+    def at_end(self, name: str, value: float) -> bool:
+        """Tell whether a value lies at an end of its parameter's range that is not neutral."""
+        parameter, neutral = self.robot.catalogue.parameters[name], self.neutral(name)
+        reach = RULES.edge_share * (parameter.high - parameter.low)
+        return any(abs(value - end) <= reach for end in (parameter.low, parameter.high) if end != neutral)
 
 
 def effects_of(names: tuple[str, ...]) -> tuple[str, ...]:

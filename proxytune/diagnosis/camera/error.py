@@ -150,6 +150,8 @@ class CameraDiagnosis:
     notes: tuple[str, ...]  # what else is to be known, a line each
     named: CameraSelection  # all fits
     gathered: Gathered  # all frames that were used
+    # names in θ of what was added that lies at an end of all that is possible: it then stands for something else
+    at_ends: tuple[str, ...] = ()
 
 
 def estimate_of(value: float, sd: float, unit: str) -> Estimate:

@@ -290,7 +290,11 @@ def camera_document(diagnosis: CameraDiagnosis) -> dict[str, Any]:
 
 def camera_effects(diagnosis: CameraDiagnosis) -> list[dict[str, Any]]:
     """The effects of the camera that were added, as `diagnose --json` has them."""
-    return [_camera_effect_document(effect, diagnosis, diagnosis.theta) for effect in diagnosis.effects]
+    return [
+        _camera_effect_document(effect, diagnosis, diagnosis.theta)
+        | {"at_edge": [name for name in effect.names if name in diagnosis.at_ends]}
+        for effect in diagnosis.effects
+    ]
 
 
 def _plain(value: Any) -> Any:

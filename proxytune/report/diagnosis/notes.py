@@ -29,14 +29,19 @@ AMPLE = 30.0
 
 def motion_headline(diagnosis: Diagnosis, found: str = "", beside: str = "") -> str:
     """What was found and fitted, in the words of `meanings`, then the verdict and what it means."""
-    meaning = VERDICTS[diagnosis.verdict]["motion"]
-    if diagnosis.edges:
-        end = f"{listed(diagnosis.edges)} at the end of the range"
-        rest = "" if diagnosis.verdict == "partly explained" else f"; {meaning}"
-        stands = "stands" if len(diagnosis.edges) == 1 else "stand"
-        meaning = f"{end} {stands} for something else, which no named effect explains{rest}"
+    meaning = meaning_of(diagnosis.verdict, "motion", diagnosis.edges)
     sure = f" (expected false names: at most {diagnosis.expected_false_names:.2f})" if diagnosis.effects else ""
     return f"{diagnosis.log}: {told(found, beside, diagnosis.verdict)}: {meaning}{sure}"
+
+
+def meaning_of(verdict: str, part: str, at_ends: Sequence[str]) -> str:
+    """What a verdict on motion or the camera means; values at the end of all that is possible explain nothing."""
+    meaning = VERDICTS[verdict][part]
+    if not at_ends:
+        return meaning
+    rest = "" if verdict == "partly explained" else f"; {meaning}"
+    stand = f"{listed(at_ends)} at the end of the range {'stands' if len(at_ends) == 1 else 'stand'}"
+    return f"{stand} for something else, which no named effect explains{rest}"
 
 
 def told(found: str, beside: str, verdict: str) -> str:

@@ -23,6 +23,8 @@ from proxytune.diagnosis.camera.selection import NEAR
 from proxytune.driving import LINES
 from proxytune.errors import LogError
 from proxytune.logs import Frames, Log, LogEpisode, read_log
+from proxytune.report.diagnosis import document
+from proxytune.report.diagnosis.camera_notes import camera_headline
 
 SETS = (
     ("none drive horseshoe 20mm_tape", 501, 40),
@@ -109,6 +111,7 @@ LOGS = {
     "waved": lambda: write("waved", waved()),
     "rectified": lambda: write("rectified", shown((("lens_distortion", -0.25),)), rectified=True),
     "bent": lambda: write("bent", shown((("lens_distortion", -0.25),))),
+    "squeezed": lambda: write("squeezed", shown((("pixel_aspect", 1.4),))),
 }
 
 
@@ -186,6 +189,17 @@ def test_effects_are_those_on_camera_and_pictures_and_a_log_needs_frames():
     assert {"camera_pitch", "blur", "exposure", "camera_latency"} <= set(effects)
     assert not {"trim", "delay", "yaw_scrub"} & set(effects)
     assert set(declared_camera_effects(ROBOT)) == {"camera_pitch", "blur"}
+
+
+def test_an_effect_at_the_end_of_all_that_is_possible_is_no_explanation_and_no_interval_goes_beyond_it():
+    """Things look 1.4 times as wide as they are, which is the most there is; nothing else is left over."""
+    found = diagnosed_frames("squeezed")
+    assert not found.residual_fields[1].significant
+    assert found.at_ends == ("pixel_aspect",)
+    assert found.verdict == "partly explained"
+    assert found.theta["pixel_aspect"].interval[0] < found.theta["pixel_aspect"].interval[1] == 1.4
+    assert [one["at_edge"] for one in document.camera_effects(found)] == [["pixel_aspect"]]
+    assert ": pixel_aspect at the end of the range stands for something else, " in camera_headline("log", found)
 
 
 STRETCH = 2

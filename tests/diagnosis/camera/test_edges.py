@@ -332,3 +332,9 @@ def test_a_robot_without_a_camera_is_refused_beforehand_and_a_map_is_a_shipped_o
     assert read_road(str(file)).segments == read_road("horseshoe").segments
     with pytest.raises(SettingsError):
         read_road("nowhere")
+
+
+def test_a_value_is_at_an_end_of_its_range_within_a_hundredth_of_it_unless_that_end_is_neutral():
+    assert [OPTICS.at_end("pixel_aspect", value) for value in (0.7, 0.72, 1.38, 1.395)] == [True, False, False, True]
+    assert not OPTICS.at_end("camera_latency", 0.0)
+    assert OPTICS.at_end("camera_latency", 0.5)

@@ -175,4 +175,9 @@ def test_a_headline_says_what_the_verdict_means_and_notes_tell_what_was_found_wh
     (roll,) = diagnosis.effects
     told = camera_notes(replace(diagnosis, effects=(replace(roll, rivals=("camera_yaw", "heading_offset")),)))
     assert told[0].endswith("; these frames fit camera_yaw, heading_offset as well")
+    (against, *_) = camera_notes(replace(diagnosis, effects=(replace(roll, nats=-9.6, error_without=1.43),)))
+    assert against == (
+        "added camera_roll: log-likelihood gain −10 nats, so the frames fitted speak against it; it is kept for frames "
+        "that were not fitted: without it the displacement of markings grows by 43 %"
+    )
     assert camera_headline("mine", clean) == "mine: camera: nothing missing: the declared camera explains the frames"

@@ -45,8 +45,10 @@ def _say_added(effect: CameraEffect) -> str:
     rivals, growth = ", ".join(effect.rivals), f"grows by {_growth(effect)} %"
     if effect.nats is not None:
         beside = f"; these frames fit {rivals} as well" if rivals else ""
-        gain = f"log-likelihood gain {effect.nats:.0f} nats"
-        return f"added {effect.effect}: {gain}, without it the displacement of markings {growth}{beside}"
+        gain, kept = f"log-likelihood gain {fixed(effect.nats, 0)} nats", ""
+        if effect.nats <= -0.5:
+            kept = " so the frames fitted speak against it; it is kept for frames that were not fitted:"
+        return f"added {effect.effect}: {gain},{kept} without it the displacement of markings {growth}{beside}"
     beside = f"; {rivals} looks like it" if rivals else ""
     if effect.error_without is None:
         return f"added {effect.effect}, which no model can predict pixel by pixel{beside}"

@@ -315,6 +315,7 @@ COLOURED = 40
 LEAST_COLOURED, FAR_MORE = 0.001, 3.0
 """Blue comes first in pictures of which a larger share is cyan, so many times as much as yellow."""
 SWAPPED = "the pictures have blue first; they were taken as blue, green, red: save them as red, green, blue"
+GREY = "beware: the pictures are grey, so that yellow markings are hardly seen; colour pictures tell more"
 
 FEWEST_POINTS = 30
 FEWEST_FRAMES = 20
@@ -357,7 +358,8 @@ def gather_views(log: Log, frames: Frames, robot: Robot) -> Gathered:
     count, every = len(numbers), len(frames.paths)
     notes = [f"{every - known} of {every} frames have no pose at their time and are left out"] if known < every else []
     notes += [f"{count} of {known} frames are used, evenly spread: more tell no more"] if count < known else []
-    return Gathered(views, numbers, pictures, frames, (*notes, *((SWAPPED,) if swapped else ())))
+    notes += [SWAPPED] if swapped else [GREY] if (pictures == pictures[..., :1]).all() else []
+    return Gathered(views, numbers, pictures, frames, tuple(notes))
 
 
 def read_road(name: str) -> Road:

@@ -247,8 +247,11 @@ def matched_share(fit: CameraFit) -> float:
     return float(matched.sum() / max(int(there.near.sum()), 1))
 
 
-def check_match(name: str, fit: CameraFit) -> tuple[str, ...]:
-    """Refuse frames that do not belong to the poses, with what would make them, or note that they match poorly."""
+def check_match(name: str, fit: CameraFit, *, grey: bool = False) -> tuple[str, ...]:
+    """Refuse frames that do not belong to the poses, with what would make them, or note that they match poorly.
+
+    In grey pictures edges of yellow markings match nothing, so that a poor match says nothing of poses and map.
+    """
     share = matched_share(fit)
     if share >= USUAL_MATCHED:
         return ()
@@ -264,6 +267,8 @@ def check_match(name: str, fit: CameraFit) -> tuple[str, ...]:
         raise LogError(f"{problem}; {100 * causes[likely]:.0f} % match if {likely}; correct that")
     if share < FEWEST_MATCHED:
         raise LogError(f"{problem}; {ADVICE}")
+    if grey:
+        return ()
     usual = f"{100 * USUAL_MATCHED:.0f} % or more is usual"
     return (f"{100 * share:.0f} % of the markings' edges match ({usual}): poses or map are off by centimetres",)
 

@@ -17,9 +17,10 @@ from viewed import NEUTRAL, at_truth, driven, everything, pushed, stood, tracked
 from proxytune.diagnosis import camera_effects, project
 from proxytune.diagnosis.answer import verdict
 from proxytune.diagnosis.camera.diagnose import declared_camera_effects, describe_map, diagnose_camera, is_explained
+from proxytune.diagnosis.camera.edges import GREY
 from proxytune.diagnosis.camera.fitting import fit_camera
 from proxytune.diagnosis.camera.model import draw_pictures, neutral_state
-from proxytune.diagnosis.camera.selection import NEAR
+from proxytune.diagnosis.camera.selection import NEAR, USUAL_MATCHED
 from proxytune.driving import LINES
 from proxytune.errors import LogError
 from proxytune.logs import Frames, Log, LogEpisode, read_log
@@ -111,6 +112,7 @@ LOGS = {
     "waved": lambda: write("waved", waved()),
     "rectified": lambda: write("rectified", shown((("lens_distortion", -0.25),)), rectified=True),
     "bent": lambda: write("bent", shown((("lens_distortion", -0.25),))),
+    "grey": lambda: write("grey", shown().mean(axis=-1, keepdims=True).astype(np.uint8).repeat(3, axis=-1)),
     "squeezed": lambda: write("squeezed", shown((("pixel_aspect", 1.4),))),
 }
 
@@ -200,6 +202,12 @@ def test_an_effect_at_the_end_of_all_that_is_possible_is_no_explanation_and_no_i
     assert found.theta["pixel_aspect"].interval[0] < found.theta["pixel_aspect"].interval[1] == 1.4
     assert [one["at_edge"] for one in document.camera_effects(found)] == [["pixel_aspect"]]
     assert ": pixel_aspect at the end of the range stands for something else, " in camera_headline("log", found)
+
+
+def test_grey_pictures_whose_edges_match_poorly_say_nothing_of_poses_and_map():
+    found = diagnosed_frames("grey")
+    assert found.matched < USUAL_MATCHED
+    assert found.notes == (GREY,)
 
 
 STRETCH = 2

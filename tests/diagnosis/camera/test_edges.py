@@ -323,6 +323,16 @@ def test_of_fewer_frames_than_a_camera_needs_more_are_to_be_taken_however_well_t
     assert complaint_of(gather_views, log, few, ROBOT) == f"{log.name}: frames: {problem}"
 
 
+def test_pictures_without_any_colour_are_told_to_be_grey(log, tmp_path):
+    gathered = gather_views(log, log.frames, ROBOT)
+    assert gathered.notes == ()
+    write_pictures(tmp_path, gathered.pictures[..., 1:2].repeat(3, axis=-1))
+    frames = replace(log.frames, paths=tuple(tmp_path / (PICTURES % number) for number in range(COUNT)))
+    gathered = gather_views(log, frames, ROBOT)
+    said = "beware: the pictures are grey, so that yellow markings are hardly seen; colour pictures tell more"
+    assert gathered.notes == (said,)
+
+
 def test_a_robot_without_a_camera_is_refused_beforehand_and_a_map_is_a_shipped_one_or_a_file(log):
     geometry = {"wheel_radius": 0.03, "effective_baseline": 0.16, "full_speed": 0.6}
     frames = replace(log.frames, paths=(Path("nowhere.png"),) * COUNT)

@@ -70,7 +70,9 @@ def test_frames_of_somewhere_else_are_refused_with_what_to_check_and_poses_centi
     with pytest.raises(LogError, match="check that frames and rows are the same instants, the map is the right one"):
         selection.check_match("log", fitted(poses, shown()))
     off = np.random.default_rng(3).normal(0.0, (0.03, 0.03, 0.0), (COUNT, 3))
-    (note,) = selection.check_match("log", fitted(lane_poses(COUNT) + off, shown()))
+    full = fitted(lane_poses(COUNT) + off, shown())
+    assert selection.check_match("log", full, grey=True) == ()
+    (note,) = selection.check_match("log", full)
     assert note.endswith("% of the markings' edges match (60 % or more is usual): poses or map are off by centimetres")
 
 

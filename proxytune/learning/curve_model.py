@@ -6,9 +6,9 @@ what they do to this one, plus noise:
 
     y = f_p(x) + s(x) · (g_r(x) + h_pr(x) + ε),    f_p = level + a Gaussian process (Matérn 5/2), alike for g_r and h_pr
 
-with a spread s that is larger where scores differ more, as they do where a curve rises. `draw_curves` draws all mean
-curves together from their posterior, bounded, and rising where the data allow it; `crossing` is the number of target
-samples from which on a draw stays converged, η.
+where f_p has a part that all learners share and one of its own, and s is larger where scores differ more, as they do
+where a curve rises. `draw_curves` draws all mean curves together from their posterior, bounded, and rising where the
+data allow it; `crossing` is the number of target samples from which on a draw stays converged, η.
 """
 
 import itertools
@@ -60,6 +60,7 @@ class LearningCurve:
 
 
 PRIORS: Mapping[str, tuple[float, float]] = {
+    "common": (1.0, 0.5),
     "amplitude": (1.0, 1.0),
     "length": (2.0, 0.5),
     "shared": (0.2, 1.0),
@@ -196,7 +197,8 @@ def _covariance(marks: Examined, values: Mapping[str, float], spread: Floats) ->
 
 def _means(values: Mapping[str, float], same: Flags, apart: Floats) -> Floats:
     """Prior covariance of mean curves."""
-    return np.asarray(LEVEL**2 + values["amplitude"] ** 2 * same * _matern(apart, values["length"]))
+    parts = values["common"] ** 2 + values["amplitude"] ** 2 * same
+    return np.asarray(LEVEL**2 + parts * _matern(apart, values["length"]))
 
 
 def _matern(apart: Floats, length: float) -> Floats:

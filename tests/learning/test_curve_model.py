@@ -191,6 +191,14 @@ def test_what_a_repetition_does_to_every_learner_is_no_noise_that_more_curves_av
     assert np.sqrt(after) > 1.5 > np.sqrt(before)
 
 
+def test_what_every_learner_learns_alike_is_a_rise_of_all_curves_and_no_repetition_s_doing():
+    scores = np.random.default_rng(4).normal(scale=1.0, size=(10, len(STEPS))) + (0.0, 1.4, 2.1, 3.2, 3.5)
+    curves = {name: LearningCurve(STEPS, scores) for name in ("none", "one", "two")}
+    drawn = draw_curves(curves, (-10.0, 10.0))
+    for one in drawn.scores.values():
+        assert one.mean(axis=0)[[0, -1]] == pytest.approx(scores.mean(axis=0)[[0, -1]], abs=0.7)
+
+
 @pytest.mark.parametrize("score", [0.0, 60.0])
 def test_scores_that_are_all_the_same_are_fitted_without_complaint(score):
     rows = marks(np.zeros(6))

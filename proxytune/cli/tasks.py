@@ -4,6 +4,7 @@ import argparse
 import math
 import shlex
 from pathlib import Path
+from typing import Any
 
 from rich.console import Group
 from rich.text import Text
@@ -146,8 +147,8 @@ def predict(arguments: argparse.Namespace) -> Answer:
     check_place(arguments.output, folder=arguments.frames, inputs=(*log, *_files_of(arguments.model, Path.cwd())))
     if arguments.frames and arguments.horizon is not None:
         raise InputError("--horizon: is for poses, and --frames predicts pictures instead; leave one of the two out")
-    horizon = 2.0 if arguments.horizon is None else arguments.horizon
-    chosen = {"horizon_s": horizon, "wanted": wanted_of(arguments), "facts": facts_of(arguments)}
+    chosen: dict[str, Any] = {"wanted": wanted_of(arguments), "facts": facts_of(arguments)}
+    horizon = chosen["horizon_s"] = 2.0 if arguments.horizon is None else arguments.horizon
     with waiting("predicting") as tell:
         found = api.predict(arguments.model, arguments.log, frames=folder, tell=tell, **chosen)
     if isinstance(found, api.PicturePrediction):

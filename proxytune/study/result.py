@@ -142,8 +142,8 @@ def result_of(run: StudyRun, scored_anew: Sequence[TrialRecord] | None = None) -
     earlier = earlier_trials(run)
     if not any(trial.state == "finished" for trial in trials) and (run.settings.budget or not earlier):
         if not trials and run.settings.objective == LEARNING:
-            told = f"is of a study of '{LEARNING}', which tells its best teacher in report.html and no best θ"
-            raise RunError(f"{run.store.path}: {told}; where a θ is needed, give it itself, as in a model.toml")
+            problem = f"is of a study of '{LEARNING}', which tells its best teacher in report.html and no best θ"
+            raise RunError(f"{run.store.path}: {problem}; where a θ is needed, give it itself, as in a model.toml")
         reason = f"all trials failed, the first because {trials[0].failure}" if trials else "no trial is finished yet"
         raise RunError(f"{run.store.path}: {reason}")
     study, space = run.study, run.settings.space

@@ -317,7 +317,9 @@ class Odd(Matrix):
         return self.weights
 
 
-@pytest.mark.parametrize("weights", [[1, 2], None, {"w": object()}, {3: np.zeros(2)}], ids=repr)
+@pytest.mark.parametrize(
+    "weights", [[1, 2], None, {"w": object()}, {3: np.zeros(2)}], ids=("a list", "none", "an object", "a number")
+)
 def test_weights_that_are_no_arrays_by_name_are_refused_by_the_learners_name(tmp_path, weights):
     one = setup(tmp_path, learner=Odd(weights=weights))
     told = f"none: train of '{one.settings.learner}' returned no arrays of numbers by name; return a dict of such"

@@ -226,9 +226,7 @@ def _single_clocks(
     return kept, jumps, common, others
 
 
-def _squares_by_reaction(
-    log: Log, drives: Drives, speeds: latency.Speeds
-) -> tuple[latency.Blocks, Floats, latency.Reaction, bool]:
+def _squares_by_reaction(log: Log, drives: Drives, speeds: latency.Speeds) -> _Squares:
     """Squares of blocks that the best reaction leaves, their latencies, it, and whether its own is impossible."""
     best, apart = _reaction(drives, speeds)
     count = int(_reach(drives) / latency.STEP_S)

@@ -26,6 +26,7 @@ from proxytune.space import Interval, Parameter, Theta
 from proxytune.storage import Store, SweepRecord, is_begun
 from proxytune.study import (
     LEARNING,
+    WITHOUT_THETA,
     Evaluation,
     Study,
     StudyRun,
@@ -51,8 +52,8 @@ def best_theta(study: Study, option: str = "--at") -> Theta:
     if not has_answer(study):
         folder = study.settings.home
         if study.settings.objective == LEARNING:
-            found = f"is a study of '{LEARNING}', which tells its best teacher in report.html and no best θ"
-            raise InputError(f"{folder}: {found}; give θ itself: {option} NAME=VALUE,NAME=VALUE")
+            remedy = f"give θ itself: {option} NAME=VALUE,NAME=VALUE"
+            raise InputError(f"{folder}: is a {WITHOUT_THETA}; {remedy}")
         raise InputError(f"{folder}: has no finished trial; run it first (python -m proxytune study {folder})")
     with Store.read(study.settings.home) as store:
         try:

@@ -70,6 +70,7 @@ from .settings import (
     FILE_NAME as FILE_NAME,
     LEARNING as LEARNING,
     MADE as MADE,
+    WITHOUT_THETA as WITHOUT_THETA,
     StudySettings as StudySettings,
     read_study_settings as read_study_settings,
     settings_document as settings_document,

@@ -139,6 +139,8 @@ FILE_NAME = "study.toml"
 FORMAT = 1
 LEARNING = "plv"
 """The objective that is not a measure of scores but of learning."""
+WITHOUT_THETA = f"study of '{LEARNING}', which tells its best teacher in report.html and no best θ"
+"""What such a study is called by whoever asks it for its best θ."""
 KEYS = (
     "format", "name", "family", "proxy", "target", "target_columns", "truth", "learn_from", "low_fidelity", "objective",
     "metrics", "agents", "starts", "budget", "initial", "batch", "engine", "seed", "jobs", "on_failure", "preflight",

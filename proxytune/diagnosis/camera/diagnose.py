@@ -15,7 +15,7 @@ from proxytune.arrays import one_thread
 from proxytune.diagnosis.answer import Estimate, Progress, verdict
 from proxytune.diagnosis.camera import error, selection
 from proxytune.diagnosis.camera.appearance import Appearance, changes, look_at
-from proxytune.diagnosis.camera.edges import DISTORTION, GREY, MOVING, READOUT, Gathered, Tape, effects_of, gather_views
+from proxytune.diagnosis.camera.edges import DISTORTION, MOVING, READOUT, Gathered, Tape, effects_of, gather_views
 from proxytune.diagnosis.camera.fitting import CameraFit
 from proxytune.diagnosis.stages import Stages, facts_of
 from proxytune.driving import LINES, Robot
@@ -197,7 +197,7 @@ def diagnose_camera(
     names += [name for name in MOVING if views.tracks.moving and name not in fixed]
     unknown = stated.position_m is None or stated.heading_deg is None
     full = keep("everything", lambda: selection.fit_everything(views, names, fixed, learn_scatter=unknown))
-    notes = keep("match", lambda: selection.check_match(log.name, full, grey=GREY in gathered.notes))
+    notes = keep("match", lambda: selection.check_match(log.name, full, grey=gathered.grey))
     report("looking for what the camera lacks")
     own = [effect for effect in declared if effect in effects_of(tuple(names))]
     named = keep("named", lambda: selection.select_camera_effects(full, own))

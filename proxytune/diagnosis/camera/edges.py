@@ -230,9 +230,8 @@ class Optics:
 
     def at_end(self, name: str, value: float) -> bool:
         """Tell whether a value lies at an end of its parameter's range that is not neutral."""
-        parameter, neutral = self.robot.catalogue.parameters[name], self.neutral(name)
-        reach = RULES.edge_share * (parameter.high - parameter.low)
-        return any(abs(value - end) <= reach for end in (parameter.low, parameter.high) if end != neutral)
+        parameter = self.robot.catalogue.parameters[name]
+        return RULES.at_end(value, (parameter.low, parameter.high), self.neutral(name))
 
 
 def effects_of(names: tuple[str, ...]) -> tuple[str, ...]:
@@ -330,6 +329,7 @@ class Gathered:
     numbers: NDArray[np.intp]
     pictures: NDArray[np.uint8]
     frames: Frames
+    grey: bool  # whether no picture has any colour
     notes: tuple[str, ...]
 
 
@@ -358,8 +358,9 @@ def gather_views(log: Log, frames: Frames, robot: Robot) -> Gathered:
     count, every = len(numbers), len(frames.paths)
     notes = [f"{every - known} of {every} frames have no pose at their time and are left out"] if known < every else []
     notes += [f"{count} of {known} frames are used, evenly spread: more tell no more"] if count < known else []
-    notes += [SWAPPED] if swapped else [GREY] if (pictures == pictures[..., :1]).all() else []
-    return Gathered(views, numbers, pictures, frames, tuple(notes))
+    grey = bool((pictures == pictures[..., :1]).all())
+    notes += [SWAPPED] if swapped else [GREY] if grey else []
+    return Gathered(views, numbers, pictures, frames, grey, tuple(notes))
 
 
 def read_road(name: str) -> Road:

@@ -478,10 +478,8 @@ def nudged(drives: Drives, theta: Theta, coordinate: Coordinate, share: float) -
 
 def at_edge(name: str, value: float, drives: Drives) -> bool:
     """Tell whether a value lies at an end of its parameter's range that is not neutral."""
-    low, high = span((name,), drives)
     neutral = drives.robot.catalogue.parameters[name].neutral_value(drives.robot.figures)
-    reach = drives.rules.edge_share * (high - low)
-    return any(abs(value - end) <= reach for end in (low, high) if end != neutral)
+    return drives.rules.at_end(value, span((name,), drives), neutral)
 
 
 def widened(drives: Drives, theta: Theta, free: Sequence[Coordinate]) -> Drives:

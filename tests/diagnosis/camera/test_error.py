@@ -25,7 +25,7 @@ def named():
 
 
 def gathered(shown, fixed=True):
-    return Gathered(named().full.views, np.arange(COUNT), shown, SimpleNamespace(fixed_exposure=fixed), ())
+    return Gathered(named().full.views, np.arange(COUNT), shown, SimpleNamespace(fixed_exposure=fixed), False, ())
 
 
 @functools.cache

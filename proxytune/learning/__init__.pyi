@@ -29,6 +29,7 @@ from .plv import (
     more_needed as more_needed,
     next_examinations as next_examinations,
     sample_needs as sample_needs,
+    samples_needed as samples_needed,
     teaching_value as teaching_value,
 )
 from .settings import (

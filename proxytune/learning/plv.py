@@ -93,6 +93,14 @@ class SampleNeeds:
         """The largest number of target samples."""
         return float(self.draws.counts[-1])
 
+    def fewest(self, name: str) -> Floats:
+        """The fewest target samples that a learner may need, draw by draw.
+
+        One that knows nothing at 0 and has converged at the first count may have needed a single sample.
+        """
+        needed, untaught = self.needed[name], np.isnan(self.draws.scores[name][:, 0])
+        return np.where(untaught & (needed <= self.draws.first), 1.0, np.minimum(needed, self.last))
+
 
 def sample_needs(
     curves: Mapping[str, LearningCurve],
@@ -146,7 +154,7 @@ def teaching_value(needs: SampleNeeds, proxy: str) -> TeachingValue:
 def samples_needed(needs: SampleNeeds, name: str) -> LearningEstimate:
     """The target samples that a learner needs, with its 95 % interval; None beyond the largest count."""
     needed = needs.needed[name]
-    return _ends(least=np.minimum(needed, needs.last), middle=needed, most=needed)
+    return _ends(least=needs.fewest(name), middle=needed, most=needed)
 
 
 def more_needed(needs: SampleNeeds, *, more: str, less: str) -> LearningEstimate:
@@ -157,15 +165,15 @@ def more_needed(needs: SampleNeeds, *, more: str, less: str) -> LearningEstimate
 def estimate_figure(
     figure: Callable[[Floats, Floats], Floats], needs: SampleNeeds, *, more: str, less: str
 ) -> LearningEstimate:
-    """A figure of what two learners need, with the ends of its 95 % interval that unreached η leave possible.
+    """A figure of what two learners need, with the ends of its 95 % interval that the grid's two ends leave possible.
 
     Draw by draw, it rises with the η of the one that needs more and falls with that of the other.
     """
-    first, second, last = needs.needed[more], needs.needed[less], needs.last
+    first, second = needs.needed[more], needs.needed[less]
     reached = np.isfinite(second)
     with np.errstate(invalid="ignore", divide="ignore"):
-        least = np.where(reached, figure(np.minimum(first, last), second), -np.inf)
-        most = figure(first, np.minimum(second, last))
+        least = np.where(reached, figure(needs.fewest(more), second), -np.inf)
+        most = figure(first, needs.fewest(less))
         # Even a figure that is bounded is not known where the first is not
         known = np.where(np.isfinite(first), figure(first, second), np.inf)
     return _ends(least=least, middle=np.where(reached, known, -np.inf), most=most)

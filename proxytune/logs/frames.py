@@ -158,6 +158,8 @@ def _read_instants(path: Path, samples: Rows, episodes: Sequence[LogEpisode]) ->
 Pictures = NDArray[np.uint8]
 BROKEN = (OSError, SyntaxError, ValueError, TypeError, EOFError, struct.error, zlib.error, Image.DecompressionBombError)
 """What Pillow raises at files that are cut off or damaged; of their EXIF TypeError."""
+UPRIGHT = 1
+"""The EXIF orientation of a picture that is to be shown as it is stored."""
 
 
 def read_pictures(frames: Frames, numbers: Sequence[int], columns: int = 160) -> Pictures:
@@ -184,7 +186,8 @@ def _read_picture(path: Path, columns: int) -> tuple[Pictures, tuple[int, int]]:
     """A picture averaged down, and its whole width and height; turned as its file says that it is to be shown."""
     try:
         with open_picture(path, path, ("PNG", "JPEG")) as image:
-            lies = image.getexif().get(ExifTags.Base.Orientation, 1) in (5, 6, 7, 8)
+            turned = _orientation(image)
+            lies = turned in (5, 6, 7, 8)
             size = image.size[::-1] if lies else image.size
             if image.mode.startswith(("I", "F")):
                 raise LogError(f"{path}: has more than 8 bits a pixel; save it with 8 bits for each colour")
@@ -193,7 +196,8 @@ def _read_picture(path: Path, columns: int) -> tuple[Pictures, tuple[int, int]]:
                 wanted = columns, max(1, round(height * columns / width))
             # Half of what a JPEG averages is left to the box
             image.draft(None, (2 * wanted[lies], 2 * wanted[not lies]))
-            ImageOps.exif_transpose(image, in_place=True)
+            if turned != UPRIGHT:
+                ImageOps.exif_transpose(image, in_place=True)
             whole = image.convert("RGB")
     except FileNotFoundError:
         raise LogError(f"{path}: no such file; add the picture") from None
@@ -201,3 +205,11 @@ def _read_picture(path: Path, columns: int) -> tuple[Pictures, tuple[int, int]]:
         raise LogError(f"{path}: is not a whole PNG or JPEG picture; save it again or leave its frame out") from None
     small = whole if whole.size == wanted else whole.resize(wanted, Image.Resampling.BOX)
     return np.asarray(small), size
+
+
+def _orientation(image: Image.Image) -> int:
+    """A picture's EXIF orientation; upright where its EXIF is damaged, which the picture itself need not be."""
+    try:
+        return int(image.getexif().get(ExifTags.Base.Orientation, UPRIGHT))
+    except BROKEN:
+        return UPRIGHT

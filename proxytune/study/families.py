@@ -133,9 +133,11 @@ class ComparedFamilies:
         """The mean of each family's episodes' seconds, and such means when episodes are drawn, alike in all."""
         costs = {}
         for one in self.families:
-            count, seconds = len(one.episode_seconds), np.array(one.episode_seconds)
-            drawn = np.random.default_rng(0).multinomial(count, np.full(count, 1 / count), size=RESAMPLES)
-            costs[one.name] = float(seconds.mean()), np.asarray(drawn @ seconds / count)
+            # Episodes of one fleet were timed together: they have the same seconds, and are drawn together
+            seconds, sizes = np.unique(one.episode_seconds, return_counts=True)
+            count = len(seconds)
+            drawn = sizes * np.random.default_rng(0).multinomial(count, np.full(count, 1 / count), size=RESAMPLES)
+            costs[one.name] = float(np.mean(one.episode_seconds)), np.asarray(drawn @ seconds / drawn.sum(axis=1))
         return costs
 
 

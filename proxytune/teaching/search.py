@@ -130,6 +130,10 @@ def why_unknown(needs: learning.SampleNeeds) -> PlvUnknown | None:
     if not np.isfinite(np.median(needs.needed[learning.NONE])):
         reason = f"without a proxy the score does not come to {needs.when.threshold:g} within {last} samples"
         return PlvUnknown(reason, f"lower teaching.level, or {RAISE}")
+    alone = learning.samples_needed(needs, learning.NONE)
+    if alone.low != alone.high == needs.draws.first:
+        reason = f"without a proxy the score comes to {needs.when.threshold:g} by {alone.high:g} samples already"
+        return PlvUnknown(reason, "add smaller numbers to teaching.target_samples, or lower teaching.tolerance")
     return None
 
 

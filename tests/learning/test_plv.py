@@ -55,6 +55,17 @@ def test_a_proxy_is_worth_the_samples_between_crossings_with_a_bound_where_none_
     assert 0.0 < found.low < found.high == 1.0
 
 
+def test_who_has_converged_at_the_first_count_of_the_grid_may_have_needed_a_single_sample():
+    early = {"none": curve(np.nan, 50, 50, 50, 50), "proxy": curve(50, 50, 50, 50, 50), "poor": curve(0, 0, 0, 50, 50)}
+    needs = sample_needs(early, best_score=60.0, tolerance=5.0)
+    helped, harmed = teaching_value(needs, "proxy"), teaching_value(needs, "poor")
+    assert (helped.without.low, helped.without.value, helped.without.high) == (1.0, 100.0, 100.0)
+    assert (helped.plv.low, helped.plv.value, helped.plv.high) == (1.0, 100.0, 100.0)
+    assert harmed.factor.low < harmed.factor.value / 50.0
+    assert harmed.plv.high < -90.0
+    assert more_needed(needs, more="poor", less="none").high == pytest.approx(-harmed.plv.low)
+
+
 def test_a_grid_is_settled_by_its_last_doubling_alone():
     rising = curve(np.nan, 10, 20, 30, 50)
     assert judged(proxy=curve(0, 10, 20, 30, 40)).settled

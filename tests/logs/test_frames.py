@@ -7,6 +7,7 @@ from hypothesis import given, settings, strategies as st
 from log_folders import complaint, write_files
 from one_line import complaint_of
 from PIL import ExifTags, Image
+from PIL.PngImagePlugin import PngInfo
 
 from proxytune.api import log_of
 from proxytune.logs import Frames, read_log, read_pictures
@@ -236,6 +237,13 @@ def test_a_picture_is_read_as_its_orientation_says_that_it_is_to_be_shown(frames
     exif[ExifTags.Base.Orientation] = orientation
     turned = read_pictures(frames_of(np.ascontiguousarray(stored(LARGE)), ending=ending, exif=exif), [0])
     np.testing.assert_allclose(turned, read_pictures(frames_of(LARGE, ending=ending), [0]), atol=10.0)
+
+
+def test_a_picture_whose_exif_is_damaged_is_read_as_it_is_stored(frames_of):
+    damaged = PngInfo()
+    damaged.add_text("Raw profile type exif", "\nexif\n 10\nzz")
+    frames = frames_of(LARGE, pnginfo=damaged)
+    np.testing.assert_array_equal(read_pictures(frames, [0]), read_pictures(frames_of(LARGE), [0]))
 
 
 @pytest.mark.parametrize("ending", ["png", "jpg"])

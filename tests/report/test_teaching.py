@@ -43,8 +43,11 @@ LESSONS = (
 )
 
 
-def experiment(lessons=LESSONS, gain=1.0, published=NOBODY, examinations=None, costs=COSTS):
-    without = LearningCurve(COUNTS, np.array([[np.nan, 5.0, 20.0, 40.0, 50.0]] * 3))
+ALONE = (5.0, 20.0, 40.0, 50.0)
+
+
+def experiment(lessons=LESSONS, gain=1.0, published=NOBODY, examinations=None, costs=COSTS, alone=ALONE):
+    without = LearningCurve(COUNTS, np.array([[np.nan, *alone]] * 3))
     curves = {"none": without, **{one.name: one.curve for one in lessons}}
     needs = sample_needs(curves, best_score=60.0, tolerance=5.0, level=50.0, draws=60)
     taught = {"published": published, "published_in": "a paper", "examinations": examinations, "costs": costs}
@@ -86,6 +89,9 @@ def test_the_next_step_is_more_seeds_while_something_is_open_and_says_why_plv_is
     assert "raise teaching.seeds from 3 to 6" in teach_next_step(experiment())
     assert "train in a proxy that saves" in teach_next_step(experiment(LESSONS[:2]))
     assert "train without these proxies" in teach_next_step(experiment(LESSONS[1:2]))
+    early = teach_next_step(experiment(alone=(49.0, 50.0, 50.0, 50.0)))
+    assert early.startswith("add smaller numbers to teaching.target_samples, or lower teaching.tolerance: without a")
+    assert "comes to 45 by 50 samples already" in early
     rising = experiment(gain=5.1)
     assert "is unknown: without a proxy the score still rises by more than 5" in teach_answer(rising)
     assert teach_next_step(rising).startswith("raise teaching.target_samples: ")

@@ -30,6 +30,9 @@ def test_the_cheapest_is_told_apart_episode_by_episode_and_the_highest_plv_teach
     assert other < high
     assert found.times_cheapest("single")["double"] == pytest.approx((2.0, 2.0, 2.0))
     assert low < 4.025 < high
+    # Episodes of one fleet were timed together, and tell no more than one
+    fleets = compared(family("twice", seconds=(1.0,) * 4 + (3.0,) * 4), family("one", seconds=(1.0, 3.0)))
+    assert fleets.seconds_per_episode()["twice"] == pytest.approx(fleets.seconds_per_episode()["one"])
     lessons = {
         "worse": lesson(100.0, (200.0, 50.0, 300.0)),
         "best": lesson(300.0),

@@ -34,7 +34,16 @@ from proxytune.effects.effect import (
 )
 from proxytune.effects.features import newest_signs
 from proxytune.effects.friction import Backlash, DeadBand, Stiction, taken_along
-from proxytune.effects.motors import BatterySag, DriverMap, Gain, MotorLag, Saturation, SlewRate, ThermalFade
+from proxytune.effects.motors import (
+    BatterySag,
+    DriverMap,
+    Gain,
+    MotorLag,
+    ReversalPause,
+    Saturation,
+    SlewRate,
+    ThermalFade,
+)
 from proxytune.space import Parameter
 
 THROTTLE, STEERING = 0, 1
@@ -325,6 +334,8 @@ STEERED_COMMANDS: tuple[type[Effect], ...] = (
 )  # fmt: skip
 
 THROTTLED: tuple[type[Effect], ...] = (
+    on_column(ReversalPause, THROTTLE, "reversal_pause", "The speed controller lets the motor rest for `pause` before "
+              "it drives it the other way; a stand counts as rest."),
     on_column(SlewRate, THROTTLE, "slew_rate", "The motor's driver changes throttle no faster than from rest to full "
               "within `rise_time`."),
     on_column(DriverMap, THROTTLE, "driver_map"),

@@ -166,8 +166,8 @@ _TRACKER_AND_CAMERA: tuple[type[Effect], ...] = (
 
 _ALL: tuple[type[Effect], ...] = (
     command.DelayJitter, command.DroppedCommands, command.CommandQuantisation, command.Delay,
-    motors.SlewRate, motors.DriverMap, friction.DeadBand, friction.Stiction, motors.Saturation, motors.Trim,
-    motors.WheelGain, motors.BatterySag, motors.ThermalFade, motors.MotorLag, friction.Backlash,
+    motors.ReversalPause, motors.SlewRate, motors.DriverMap, friction.DeadBand, friction.Stiction, motors.Saturation,
+    motors.Trim, motors.WheelGain, motors.BatterySag, motors.ThermalFade, motors.MotorLag, friction.Backlash,
     friction.WheelRipple, motion.YawScrub, motion.Understeer, motion.YawLag, motion.Inertia,
     motion.TurnSlip, motion.LateralSlip, motion.CrossCoupling, motion.FloorSlope, motion.SlipperyPatch,
     *_TRACKER_AND_CAMERA,

@@ -22,6 +22,10 @@ ROBOT = "duckiebot"
 RATE_HZ = 60.0
 HELD = 3
 """Samples over which a command holds."""
+STANDS = 0.1
+"""The share of commands that are to stand."""
+LENGTHS = {HELD: 2700, 15: 2700, 150: 1800}
+"""A signal over which every parameter must matter: samples of commands that hold so long."""
 PICTURE = {"camera_columns": 4.0, "camera_rows": 3.0}
 """The size of the pictures that image effects are tried on: no two sides alike, so that none is taken for the other."""
 WAY = np.repeat(np.linspace(0.0, 21.0, 225), 2) * np.tile((1.0, -1.0), 225)
@@ -52,15 +56,17 @@ class Subject:
         usual = first.probes[len(first.probes) // 2] if first.probes else 0.5 * (first.low + first.high)
         return self.at({**({first.name: usual} if parameter.shape else {}), parameter.name: value})
 
-    def signal(self, seed: int, length: int = 90) -> Signal:
-        """Held commands or motion, camera figures, or changing pictures, shape (length, channels)."""
+    def signal(self, seed: int, length: int = 90, held: int = HELD) -> Signal:
+        """Held commands or motion and stands, camera figures, or changing pictures, shape (length, channels)."""
         random, stage = np.random.default_rng(seed), self.kind.stage
         if stage is Stage.CAMERA:
             return np.repeat(self.robot.camera_figures().channels()[None], length, axis=0)
         if stage is Stage.IMAGE:
             channels = 3 * int(PICTURE["camera_columns"] * PICTURE["camera_rows"])
             return random.uniform(0.0, 255.0, (length, channels)).astype(np.float32)
-        return np.repeat(random.uniform(-1.0, 1.0, (length // HELD, len(CHANNELS[stage]))), HELD, axis=0)
+        values = random.uniform(-1.0, 1.0, (length // held, len(CHANNELS[stage])))
+        stands = random.uniform(size=values.shape) < STANDS
+        return np.repeat(np.where(stands, 0.0, values), held, axis=0)
 
     def context(self, rest: Signal, seed: int = 7) -> FilterContext:
         """The context of its filter; an effect of a place is shown one everywhere."""
@@ -178,7 +184,7 @@ def _of_the_robot(subject: Subject) -> Effect | None:
 
 def _claim_moves(subject: Subject, parameter: Parameter, least: float) -> None:
     """Each step over its usual range changes the signal, and so does each probe."""
-    signal = subject.signal(6, 2700)
+    signal = np.concatenate([subject.signal(6, length, held) for held, length in LENGTHS.items()])
     shaping = parameter is not subject.kind.parameters[0] and not parameter.shape
     remedy = "; declare one that only shapes another with Parameter(shape=True)" if shaping else ""
     steps = np.linspace(*parameter.usual_range, STEPS)
@@ -186,7 +192,7 @@ def _claim_moves(subject: Subject, parameter: Parameter, least: float) -> None:
     for (low, earlier), (high, later) in pairwise(zip(steps, filtered, strict=True)):
         line = f"is the same at {parameter.name} {low:g} and {high:g}; a parameter must matter all along its range"
         claim(_apart(earlier, later) > least, f"effect '{subject.name}' {line}{remedy}")
-    signal, neutral = subject.signal(2, 900), subject.neutral[parameter.name]
+    signal, neutral = np.concatenate((subject.signal(2, 900), signal)), subject.neutral[parameter.name]
     still = subject.filtered(subject.moved(parameter, neutral), signal)
     for probe in parameter.probes:
         moved = _apart(subject.filtered(subject.moved(parameter, probe), signal), still)

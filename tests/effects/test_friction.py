@@ -6,7 +6,7 @@ from filtered import filtered
 
 from proxytune.effects import FilterContext, effect
 from proxytune.effects.friction import Backlash, DeadBand, Stiction, WheelRipple
-from proxytune.effects.motors import BatterySag, Saturation, SlewRate, ThermalFade
+from proxytune.effects.motors import BatterySag, ReversalPause, Saturation, SlewRate, ThermalFade
 
 NOMINAL = {"full_speed": 0.6, "wheel_radius": 0.03}
 FULL_RAD_S = 20.0
@@ -139,6 +139,23 @@ def test_a_duty_rises_at_its_rate_and_a_motor_loses_by_long_work_and_recovers_at
     tired = filtered(ThermalFade(0.4, 2.0), np.concatenate((work, rest, work)))
     assert tired[599, 0] == pytest.approx(0.6, abs=0.01)
     assert tired[1200, 0] > 0.99
+
+
+def test_a_wheel_rests_before_it_turns_the_other_way_and_a_stand_counts_as_rest_or_not():
+    turned = np.concatenate((np.ones((60, 2)), -np.ones((60, 2))))
+    rests = filtered(ReversalPause(0.375, 1.0), turned)
+    np.testing.assert_array_equal(rests[:60], 1.0)
+    np.testing.assert_array_equal(rests[60:82], 0.0)
+    np.testing.assert_allclose(rests[82], -0.5)
+    np.testing.assert_array_equal(rests[83:], -1.0)
+    stood = np.concatenate((turned[:60], np.zeros((20, 2)), turned[60:]))
+    for stand, samples in ((1.0, 10), (0.5, 20), (0.0, 30)):
+        rests = filtered(ReversalPause(0.5, stand), stood)[:, 0]
+        assert np.count_nonzero(rests[80:] == 0.0) == samples
+    again = np.concatenate((np.ones((60, 2)), np.zeros((5, 2)), np.ones((60, 2))))
+    np.testing.assert_array_equal(filtered(ReversalPause(0.5, 1.0), again), again)
+    np.testing.assert_array_equal(filtered(ReversalPause(0.5, 1.0), turned[60:]), turned[60:])
+    np.testing.assert_array_equal(filtered(ReversalPause(0.5, 1.0), turned[60:], rest=(1.0, 0.0))[0], (0.0, -1.0))
 
 
 @pytest.mark.parametrize(

@@ -86,7 +86,7 @@ def prpv_text(fresh: Assessment) -> str:
 def difference_text(one: Difference) -> str:
     """Difference of one PRPV above another, with its interval."""
     ends = "" if one.low is None or one.high is None else f" ({fixed(one.low, 0)} to {fixed(one.high, 0)})"
-    return f"+{one.value}{ends}"
+    return f"+{fixed(one.value, 0)}{ends}"
 
 
 def seconds_text(value: float, low: float, high: float, unit: str = "") -> str:
@@ -104,21 +104,20 @@ def more_text(lesson: Lesson) -> str:
 
 def differences(compared: ComparedFamilies) -> dict[str, Difference]:
     """Differences of the PRPV of each family above the lowest, by name."""
-    found = compared.selection.differences if compared.selection else ()
-    return {one.worse: one for one in found if one.better == compared.predicts.best}
+    return {one.worse: one for one in compared.differences if one.better == compared.predicts.best}
 
 
 def _say_predicting(compared: ComparedFamilies) -> str:
     choice = compared.predicts
     fresh = next((one.fresh for one in compared.families if one.name == choice.best), None)
-    if fresh is None or compared.selection is None:
+    if fresh is None:
         return "not known, since no family has fresh episodes"
     score = f"fresh PRPV (proxy relative predictivity value) {prpv_text(fresh)}"
     if fresh.chance.explains:
         return f"none is shown to be better than chance; lowest is {choice.best}, {score}"
-    if compared.selection.reason:
-        return f"{choice.best}, {score}; by how much is not known: {compared.selection.reason}"
     more = differences(compared)
+    if any(one.low is None for one in more.values()):
+        return f"{choice.best}, {score}; by how much is not known: nothing was driven twice"
     alike = [f"{name} {difference_text(more[name])}" for name in choice.alike]
     worse = [f"{name} {difference_text(one)}" for name, one in more.items() if name not in choice.alike]
     return _join_clauses(f"{choice.best}, {score}", "worse", worse, alike)
@@ -179,7 +178,7 @@ def families_tables(compared: ComparedFamilies) -> tuple[Table, Table]:
         ("seconds of tuning", *(short(one.seconds) for one in families)),
         ("trials", *(str(len(one.result.trials)) for one in families)),
     ]
-    notes = ["PRPV is of fresh episodes at the best θ, from the same starts and under the same seeds in every family"]
+    notes = ["PRPV is the mean over fresh repetitions at the best θ, from the same starts in every family"]
     notes += [f"{one.name}: {line}" for one in compared.families for line in _say_family(one)]
     notes += [f"{name}: {one.failure}" for name, one in compared.lessons.items() if one.failure]
     return Table(USES, columns, tuple(rows), tuple(notes)), Table(THETA, columns, theta)
@@ -244,7 +243,7 @@ def families_document(compared: ComparedFamilies) -> dict[str, Any]:
             one.name: {**_family_document(one, costs[one.name]), **_lesson_document(compared.lessons.get(one.name))}
             for one in compared.families
         },
-        "differences": differences_document(compared.selection.differences if compared.selection else ()),
+        "differences": differences_document(compared.differences),
         "settings": dict(settings_document(compared.settings)),
     }
 

@@ -17,7 +17,6 @@ from proxytune.arrays import Floats
 from proxytune.errors import StoreError
 from proxytune.files import write_whole
 from proxytune.learning import LearningEstimate
-from proxytune.scores import ScoreTable
 from proxytune.seeds import fresh_seed
 from proxytune.settings import is_finite
 from proxytune.space import Theta
@@ -26,7 +25,7 @@ from proxytune.study.result import StudyResult
 from proxytune.study.run import seconds_of
 from proxytune.study.settings import StudySettings
 from proxytune.study.study_run import StudyRun, plan_episodes
-from proxytune.usefulness import Assessment, Selection, interval, select_proxy
+from proxytune.usefulness import Assessment, Difference, Expectation, expected_differences, interval
 
 RESAMPLES = 1000
 
@@ -49,6 +48,11 @@ class TunedFamily:
     def fresh(self) -> Assessment | None:
         """Its usefulness there in fresh episodes; None while these are not driven, or where an agent fails in all."""
         return self.result.confirmation.answer.assessment if self.result.confirmation else None
+
+    @property
+    def expected(self) -> Expectation | None:
+        """What is expected of it there in more episodes; None likewise."""
+        return self.result.confirmation.expected if self.result.confirmation else None
 
 
 @dataclass(frozen=True)
@@ -80,21 +84,18 @@ class ComparedFamilies:
     lessons: Mapping[str, Lesson] = field(default_factory=dict)  # by name; empty where not asked for, or not known
 
     @cached_property
-    def selection(self) -> Selection | None:
-        """The families by fresh PRPV, with all differences, paired by starts and seeds; None where none has any."""
-        tables: dict[str, ScoreTable] = {one.name: one.fresh.inputs.proxy for one in self.families if one.fresh}
-        if not tables:
-            return None
-        target = self.families[0].result.study.target
-        return select_proxy(proxies=tables, target=target, metrics=self.settings.metrics)
+    def differences(self) -> tuple[Difference, ...]:
+        """How much lower the PRPV expected of one is than another's, of every two that have fresh episodes."""
+        return expected_differences({one.name: one.expected for one in self.families if one.expected})
 
     @property
     def predicts(self) -> BestFamilies:
-        """The one that predicts best: the lowest PRPV in fresh episodes."""
-        if self.selection is None:
+        """The one that predicts best: the lowest PRPV expected by fresh episodes."""
+        known = {one.name: one.expected.prpv.value.value for one in self.families if one.expected}
+        if not known:
             return BestFamilies()
-        best, *others = [name for name, _ in self.selection.ranking]
-        worse = {one.worse for one in self.selection.differences if one.better == best and one.beyond_noise}
+        best, *others = sorted(known, key=known.__getitem__)
+        worse = {one.worse for one in self.differences if one.better == best and one.beyond_noise}
         return BestFamilies(best, tuple(name for name in others if name not in worse))
 
     @property

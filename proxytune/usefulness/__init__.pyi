@@ -44,6 +44,7 @@ from .expectation import (
     Expectation as Expectation,
     donors_of as donors_of,
     expect as expect,
+    expected_differences as expected_differences,
 )
 from .noise import (
     Chance as Chance,

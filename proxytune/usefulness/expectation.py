@@ -14,7 +14,8 @@ proxy draws nothing, the target's repeats are the donors, or where there are non
 which overstate noise: then a proxy is not called imperfect for that.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+import itertools
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import NamedTuple
@@ -24,6 +25,7 @@ import numpy as np
 from proxytune.arrays import NORMAL_95, Flags, Floats, Whole
 from proxytune.scores import Metric, ScoreTable
 from proxytune.usefulness.comparison import Comparison, compare, start_places
+from proxytune.usefulness.decision import Difference
 from proxytune.usefulness.noise import NoiseFloor
 from proxytune.usefulness.predictivity import ppv, ppv_of_means
 from proxytune.usefulness.resampling import interval, prpv_in_blocks
@@ -164,6 +166,25 @@ def expect(
     floor = NoiseFloor("same starts", *level) if level else unknown
     error = all_of(lambda it: ppv_of_means(it, means, beta), np.inf)[0] if beta.any() else None
     return Expectation(counted, error, len(fresh), deviation, floor)
+
+
+def expected_differences(proxies: Mapping[str, Expectation]) -> tuple[Difference, ...]:
+    """How much lower the PRPV expected of one proxy is than another's, of every two against one target.
+
+    The better one comes first; the intervals hold for all pairs at once.
+    """
+    from scipy.stats import norm
+
+    pairs = list(itertools.combinations(sorted(proxies, key=lambda name: proxies[name].prpv.value.value), 2))
+    reach = float(norm.ppf(1.0 - 0.025 / max(1, len(pairs))))
+    found = []
+    for better, worse in pairs:
+        two = proxies[better], proxies[worse]
+        more = two[1].prpv.value.value - two[0].prpv.value.value
+        half = reach * float(np.sqrt(sum(one.deviation**2 / one.repetitions for one in two)))
+        known = all(one.prpv.excess for one in two)
+        found.append(Difference(better, worse, more, *((more - half, more + half) if known else (None, None))))
+    return tuple(found)
 
 
 def _expected(

@@ -1,24 +1,28 @@
 """Several tuned families, made up of tables, seconds and learning values."""
 
+from dataclasses import replace
+from itertools import combinations
 from pathlib import Path
 from types import SimpleNamespace
+
+import numpy as np
 
 from proxytune.learning import LearningEstimate
 from proxytune.scores import Metric, ScoreTable
 from proxytune.study import ComparedFamilies, Lesson
-from proxytune.usefulness import assess
+from proxytune.usefulness import assess, donors_of, expect
 
 METRICS = (Metric("distance"),)
 AGENTS = [f"agent{number}" for number in range(8)]
 
 
-def table(shift, noise=0.0):
+def table(shift, noise=0.0, repetition=0):
     """Eight agents from six starts; a shift swaps the order of so many neighbours."""
     order = list(range(8))
     for place in range(0, 2 * shift, 2):
         order[place], order[place + 1] = order[place + 1], order[place]
     scores = {
-        (agent, str(start)): {"distance": 10.0 * order[row] + noise * ((row * 7 + start * 3) % 5)}
+        (agent, str(start)): {"distance": 10.0 * order[row] + noise * ((row * 7 + start * 3 + repetition) % 5)}
         for row, agent in enumerate(AGENTS)
         for start in range(6)
     }
@@ -27,10 +31,17 @@ def table(shift, noise=0.0):
 
 def family(name, shift=0, seconds=(1.0, 1.1, 0.9, 1.0), noise=0.1, fresh=True):
     """A tuned family whose agents are in the target's order but for so many pairs of neighbours."""
-    target = table(0, 0.1)
-    assessment = assess(proxy=table(shift, noise), target=target, metrics=METRICS) if fresh else None
+    target, tables = table(0, 0.1), [table(shift, noise, repetition) for repetition in range(3)]
+    twice = [np.stack([one.values, other.values]) for one, other in combinations(tables, 2)]
+    expected = expect(fresh=tables, target=target, metrics=METRICS, donors=donors_of(twice, 1)) if fresh else None
+    assessment = assess(proxy=tables[0], target=target, metrics=METRICS) if fresh else None
+    if assessment:
+        mean, low, high = expected.prpv.value
+        inner = replace(assessment.prpv_interval, low=low, high=high)
+        assessment = replace(assessment, prpv=replace(assessment.prpv, value=round(mean)), prpv_interval=inner)
     study = SimpleNamespace(target=target, settings=SimpleNamespace(home=Path("study") / "families" / name))
-    return SimpleNamespace(name=name, fresh=assessment, episode_seconds=seconds, result=SimpleNamespace(study=study))
+    known = {"fresh": assessment, "expected": expected, "episode_seconds": seconds}
+    return SimpleNamespace(name=name, **known, result=SimpleNamespace(study=study))
 
 
 def compared(*families, lessons=None):

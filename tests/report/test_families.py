@@ -27,7 +27,7 @@ def test_nothing_is_claimed_of_chance_of_several_families_and_a_clear_winner_or_
     answer = families_answer(found)
     assert answer.startswith("To predict: bullet, fresh PRPV (proxy relative predictivity value) 0 (0 to 0); worse: ")
     assert "worse: planar +8 (" in answer
-    assert answer.endswith("Cheapest: planar, 1 s per episode (0.93 to 1.1); times as long: bullet 2 (2 to 2).")
+    assert answer.endswith("Cheapest: planar, 1 s per episode (0.9 to 1.1); times as long: bullet 2 (2 to 2).")
     assert "To teach" not in answer
     assert families_next_step(found) == "use bullet to predict; its page: study/families/bullet/report.html."
     found = compared(*BOTH)

@@ -9,7 +9,7 @@ from proxytune.study import BestFamilies, Lesson
 def test_the_lowest_fresh_prpv_predicts_best_beyond_noise_and_what_has_no_fresh_episodes_is_left_out():
     found = compared(family("bad", 3), family("good", 0), family("middle", 1))
     assert found.predicts == BestFamilies("good", ())
-    assert {(one.better, one.worse, one.value) for one in found.selection.differences} == {
+    assert {(one.better, one.worse, one.value) for one in found.differences} == {
         ("good", "middle", 2),
         ("good", "bad", 6),
         ("middle", "bad", 4),

@@ -54,7 +54,7 @@ def log_cautions(log: Log, figures: Figures) -> tuple[str, ...]:
     """Sentences on what is probably not meant in a log; figures of its robot tell how far commands should take it."""
     chords = [_chords(without_outliers(episode)) for episode in log.episodes]
     names = alike_caution("drives", (episode.name for episode in log.episodes))
-    found = [
+    return (
         *figure_cautions({**log.geometry, **figures}, f"robot {log.robot}"),
         *_unused(log, figures),
         *_axes(chords),
@@ -65,8 +65,7 @@ def log_cautions(log: Log, figures: Figures) -> tuple[str, ...]:
         *outliers_note(log),
         *repeats_note(log),
         *windows_note(log),
-    ]
-    return tuple(found)
+    )
 
 
 def _unused(log: Log, figures: Figures) -> Iterator[str]:
@@ -92,11 +91,7 @@ class Chords(NamedTuple):
 
 
 def _chords(episode: LogEpisode) -> Chords:
-    times, poses = episode.times, episode.poses
-    if episode.measured is not None:
-        times, poses, _ = episode.measured
-    known = np.isfinite(poses[:, 0])
-    times, poses = times[known], poses[known]
+    times, poses = episode.as_measured
     later = np.searchsorted(times, times + CHORD_S - 1e-9)
     here = np.flatnonzero(later < len(times))
     later = later[here]
@@ -174,8 +169,7 @@ def _frozen(log: Log, asked: Sequence[tuple[Floats, Floats]]) -> Iterator[str]:
     """Tell where poses stay the same to the last digit while it is told to drive on."""
     large = LARGE * float(np.quantile(np.abs(np.concatenate([speed for speed, _ in asked])), 0.95))
     for episode, (speed, _) in zip(log.episodes, asked, strict=True):
-        times, poses = (episode.times, episode.poses) if episode.measured is None else episode.measured[:2]
-        times, poses = times[np.isfinite(poses[:, 0])], poses[np.isfinite(poses[:, 0])]
+        times, poses = episode.as_measured
         driving = np.interp(times, episode.times, np.abs(speed)) > max(large, 1e-9)
         changes = np.flatnonzero(np.append(len(poses) > 0, (np.diff(poses, axis=0) != 0.0).any(axis=1)))
         ends = np.append(changes, len(times))[1:]
@@ -190,14 +184,14 @@ def _frozen(log: Log, asked: Sequence[tuple[Floats, Floats]]) -> Iterator[str]:
 
 def _commanded(log: Log, figures: Figures) -> list[tuple[Floats, Floats]]:
     """What each drive's commands ask for at its samples: speed [m/s], NaN if not known, and turning in any unit."""
-    figure = {"duty": "full_speed", "wheel_speed": "wheel_radius"}.get(log.command, "")
-    # Throttle is no speed: a car's motor does nothing for small ones.
-    unit = {"twist": 1.0, "speed_steering": 1.0, "ackermann": np.nan}.get(log.command)
-    scale = {**log.geometry, **figures}.get(figure, np.nan) if unit is None else unit
     held = [episode.held for episode in log.episodes]
-    if figure:
-        return [(scale * one.mean(axis=1), one[:, 1] - one[:, 0]) for one in held]
-    return [(scale * one[:, 0], one[:, 1]) for one in held]
+    if log.command in ("duty", "wheel_speed"):
+        figure = "full_speed" if log.command == "duty" else "wheel_radius"
+        scale = {**log.geometry, **figures}.get(figure, np.nan)
+        return [(scale * wheels.mean(axis=1), wheels[:, 1] - wheels[:, 0]) for wheels in held]
+    # Throttle is no speed: a car's motor does nothing for small ones.
+    scale = np.nan if log.command == "ackermann" else 1.0
+    return [(scale * drives, turns) for drives, turns in (commands.T for commands in held)]
 
 
 def _turning(log: Log, drives: list[Chords]) -> Iterator[str]:

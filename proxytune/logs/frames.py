@@ -20,7 +20,6 @@ from proxytune.logs.times import places_on_grid
 from proxytune.settings import Section
 from proxytune.unpacking import ARRAYS_MB, check_unpacked, open_picture
 
-POSES = (("position_m", 10.0), ("heading_deg", 180.0))
 KEYS = ("frames", "poses", "exposure", "rectified", "shutter", "readout_s")
 LISTED = "frames.csv"
 PATTERN = re.compile(r"[^%]*%(0[1-9])?d[^%]*\.(png|jpe?g)", re.IGNORECASE)
@@ -52,8 +51,9 @@ def read_camera(settings: Section) -> StatedCamera | None:
         rule = "must have the picture's number once, as %d or %06d, and end in .png, .jpg or .jpeg"
         raise section.error("frames", f"{rule}, got '{pattern}'")
     poses = table.section("poses")
-    poses.only([name for name, _ in POSES])
-    road, position_m, heading_deg = _road(settings), *(_figure(poses, *one) for one in POSES)
+    poses.only(("position_m", "heading_deg"))
+    road = _road(settings)
+    position_m, heading_deg = _figure(poses, "position_m", 10.0), _figure(poses, "heading_deg", 180.0)
     rectified, readout_s = table.flag("rectified", False), _figure(table, "readout_s", 1.0)
     shutter = table.text("shutter", choices=("rolling", "global")) if "shutter" in table else "rolling"
     if shutter == "global" and readout_s:
@@ -141,8 +141,7 @@ def _read_instants(path: Path, samples: Rows, episodes: Sequence[LogEpisode]) ->
     drives = np.array([order[name] for name in rows.names])[rows.episode]
     times, spans = rows.values["time"], np.full((len(episodes), 2), np.nan)
     for span, episode in zip(spans, episodes, strict=True):
-        on_grid = episode.times[np.isfinite(episode.poses[:, 0])]
-        measured = on_grid if episode.measured is None else episode.measured.times
+        measured, _ = episode.as_measured
         if len(measured):
             span[:] = measured[0], measured[-1]
     begins, ends = spans[drives].T

@@ -43,10 +43,10 @@ def read_description(settings: Section) -> tuple[Log, StatedCamera | None]:
     read(lambda: settings.flag("measured", True), True)
     for key in (key for key in TEXTS if key not in ("name", "robot")):
         read(lambda key=key: settings.text(key, ""), "")  # type: ignore[misc]
-    stated = {name: key for key, name in GEOMETRY.items() if key in settings}
     geometry = {
         name: read(lambda key=key: settings.number(key, low=1e-4, high=1e4), 1.0)  # type: ignore[misc]
-        for name, key in stated.items()
+        for key, name in GEOMETRY.items()
+        if key in settings
     }
     offset = settings.get("clock_offset_s")
     log = Log(
@@ -169,8 +169,7 @@ def _issued(path: Path, command: str) -> tuple[Rows, dict[str, Issued]]:
 
 def _check_overlap(samples: Rows, rows: Rows, issued: Mapping[str, Issued], offset_s: float) -> None:
     """Refuse an episode without commands, or whose commands and poses are of different times."""
-    lasts = np.append(samples.firsts[1:], len(samples.lines)) - 1
-    for name, first, last in zip(samples.names, samples.firsts, lasts, strict=True):
+    for name, first, last in zip(samples.names, samples.firsts, samples.ends - 1, strict=True):
         if name not in issued:
             problem = f"'{name}' is not in commands.csv; add its commands, or leave it out"
             raise samples.error(int(first), "episode", problem)

@@ -78,9 +78,14 @@ class Rows:
     values: Mapping[str, Floats]
 
     @property
+    def ends(self) -> Whole:
+        """The row behind the last one of each episode (E,)."""
+        return np.append(self.firsts[1:], len(self.lines))
+
+    @property
     def episode(self) -> Whole:
         """Episode of each row (N,)."""
-        return np.repeat(np.arange(len(self.firsts)), np.diff(self.firsts, append=len(self.lines)))
+        return np.repeat(np.arange(len(self.firsts)), self.ends - self.firsts)
 
     @property
     def follows(self) -> Flags:
@@ -202,8 +207,8 @@ def _check_episodes(samples: Rows, fewest: int) -> None:
         again = int(np.argmax(repeated))
         problem = f"'{samples.names[again]}' comes back after another episode; keep each episode's rows together"
         raise samples.error(int(samples.firsts[again]), "episode", problem)
-    lengths = np.diff(np.append(samples.firsts, len(samples.lines)))
-    if (lengths < fewest).any():
-        single = int(np.argmax(lengths < fewest))
+    short = samples.ends - samples.firsts < fewest
+    if short.any():
+        single = int(np.argmax(short))
         problem = f"'{samples.names[single]}' has a single row; a drive needs two or more, so leave it out"
         raise samples.error(int(samples.firsts[single]), "episode", problem)

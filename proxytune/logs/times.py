@@ -26,14 +26,13 @@ SHORTEST_S, LONGEST_S = 1e-5, 10.0
 
 def places_on_grid(samples: Rows, rate_hz: float) -> tuple[Whole, Whole]:
     """Place of each row on all grids laid end to end (N,), and where each episode's grid ends (E,)."""
-    lasts = np.append(samples.firsts[1:], len(samples.lines)) - 1
     if not rate_hz:
-        return np.arange(len(samples.lines)), lasts + 1
+        return np.arange(len(samples.lines)), samples.ends
     time, episode = samples.values["time"], samples.episode
     elapsed = (time - time[samples.firsts][episode]) * rate_hz
     _check_grid(samples, elapsed, rate_hz)
     steps = np.rint(elapsed).astype(np.int64)
-    ends = np.cumsum(steps[lasts] + 1)
+    ends = np.cumsum(steps[samples.ends - 1] + 1)
     return steps + np.append(0, ends[:-1])[episode], ends
 
 
@@ -168,10 +167,9 @@ def episodes_at_own_times(
     rate_hz = usual * max(1, math.ceil(STEPS_HZ / usual - 0.05))
     placed = np.column_stack((samples.columns(POSE[:2]), unwrapped(samples)))
     wheels = samples.columns(WHEELS) if WHEELS[0] in samples.values else None
-    firsts = (*samples.firsts, len(samples.lines))
     episodes = []
-    for index, name in enumerate(samples.names):
-        own = slice(firsts[index], firsts[index + 1])
+    for name, first, end in zip(samples.names, samples.firsts, samples.ends, strict=True):
+        own = slice(first, end)
         times, posed = samples.values["time"][own], placed[own]
         grid, poses, measured = on_own_grid(times, posed, rate_hz)
         speeds = None if wheels is None else _held(wheels[own], np.rint((times - times[0]) * rate_hz), len(grid))

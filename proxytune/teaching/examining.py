@@ -103,12 +103,11 @@ def _shared(settings: learning.TeachingSettings, points: Sequence[CurvePoint]) -
 
     def first_of_each(points: Sequence[CurvePoint]) -> list[CurvePoint]:
         """The first point of each learning curve and repetition."""
-        first: list[tuple[CurvePoint, CurvePoint]] = []
+        first: list[CurvePoint] = []
         for point in points:
-            kind = replace(point, count=0)
-            if kind not in [known for known, _ in first]:
-                first.append((kind, point))
-        return [point for _, point in first]
+            if not any(replace(point, count=known.count) == known for known in first):
+                first.append(point)
+        return first
 
     if settings.target_lessons == learning.LEARNER:
         return first_of_each(sorted(points, key=lambda point: -point.count))

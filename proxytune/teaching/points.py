@@ -200,15 +200,12 @@ class Stage:
         start = self.weights(0)
         with watching("the learner's training"):
             weights: Any = self.setup.learner.train(samples, start, self.seed)
-            if not (isinstance(weights, Mapping) and all(map(_is_named_array, weights.items()))):
+            if not isinstance(weights, Mapping) or not all(
+                isinstance(name, str) and not np.asarray(array).dtype.hasobject for name, array in weights.items()
+            ):
                 learner = self.setup.settings.learner
                 raise LearnerError(f"train of '{learner}' returned no arrays of numbers by name; return a dict of such")
             return weights
-
-
-def _is_named_array(item: tuple[Any, Any]) -> bool:
-    name, array = item
-    return isinstance(name, str) and not np.asarray(array).dtype.hasobject
 
 
 def equal_rounds(count: int, rounds: int) -> tuple[int, ...]:

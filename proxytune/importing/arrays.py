@@ -128,12 +128,12 @@ def read_arrays(path: Path, wanted: Wanted) -> Source:
     gym-duckietown's are known by their names: `timestamps`, `actions` (N, 2), `positions` or `cur_pos` (N, 3) and
     `angles` or `cur_angle` (N,) [rad]. Of an array (N, k) a column map names a column as "states[0]".
     """
-    check_fields(wanted.columns, str(path))
+    check_fields(path, wanted)
     arrays = load_arrays(path)
     table = as_table(path, arrays, wanted.columns.get("time", ""))
     _check_wanted(table, arrays, wanted)
     table, gym, notes = _gym_duckietown(table, arrays, wanted)
-    none = "none" in (wanted.commands, wanted.kind)
+    none = wanted.without_commands
     fields = ("time", "episode", *POSE, *(() if none else ("command_time", *COMMAND_FIELDS)))
     stated = {field: entry for field, entry in (gym | dict(wanted.columns)).items() if field in fields}
     columns: Columns = choose_columns(table, stated, fields)
@@ -156,10 +156,8 @@ def _check_wanted(table: Table, arrays: Arrays, wanted: Wanted) -> None:
     if wanted.commands not in ("", "none"):
         example = f"--columns left={wanted.commands}[0],right={wanted.commands}[1]"
         raise LogError(f"{table.path}: --commands {wanted.commands}: name arrays by column, as in {example}")
-    usual = {} if wanted.columns else {name: name for name in (*ACTIONS, *POSITIONS, *ANGLES)}
-    if "none" in (wanted.commands, wanted.kind):
-        usual = {name: name for name in usual if name not in ACTIONS}
-    for field, entry in {**usual, **wanted.columns}.items():
+    usual = (*(() if wanted.without_commands else ACTIONS), *POSITIONS, *ANGLES)
+    for field, entry in (wanted.columns or {name: name for name in usual}).items():
         array = next((name for name in (entry, *(entry.split(mark)[0] for mark in ":[")) if name in arrays), "")
         if array and not any(name == array or name.startswith(f"{array}[") for name in table.names):
             other = f"is {arrays[array].shape} of {arrays[array].dtype}, but there are {len(table.cells)} times"

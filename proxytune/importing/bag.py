@@ -8,7 +8,6 @@ import math
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
-from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -65,10 +64,9 @@ class Bag:
     def messages(self, topic: str) -> Iterator[tuple[int, Any]]:
         """The messages of a topic in the order received: when each was received [ns], and what it holds."""
         connections = [connection for connection in self.reader.connections if connection.topic == topic]
-        numbers = count(1)
         incoming = self.reader.messages(connections=connections) if connections else iter(())
-        while True:
-            with complaints(self.path, f"{topic}, message {next(numbers)}: cannot be read"):
+        for number in itertools.count(1):
+            with complaints(self.path, f"{topic}, message {number}: cannot be read"):
                 received = next(incoming, None)
                 if received is None:
                     return

@@ -4,9 +4,12 @@ A unit is the one stated, else the one that a column's name ends in, else the pa
 unit that nobody stated are refused.
 """
 
+import itertools
 import re
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +17,7 @@ from numpy.typing import NDArray
 from proxytune.arrays import Floats
 from proxytune.errors import LogError
 from proxytune.importing.checks import FURTHEST_BACK_S, headings_and_tilts
-from proxytune.importing.source import Channel, Commands, Poses
+from proxytune.importing.source import Channel, Commands, Poses, Wanted
 from proxytune.importing.text import COMMAND_FIELDS, EXAMPLE, PLACE, POSE, QUANTITIES, QUATERNION, USUAL, Table
 from proxytune.logs import COMMANDS, ENABLED
 from proxytune.settings import nearest
@@ -222,11 +225,11 @@ def _names_drives(table: Table, name: str, rows: NDArray[np.intp], back: NDArray
     return np.array_equal(changes, back) and len({values[0], *values[back]}) == len(back) + 1
 
 
-def check_fields(stated: Mapping[str, str], where: str) -> None:
+def check_fields(path: Path, wanted: Wanted) -> None:
     """Refuse a column map that names something else than the package's fields."""
-    for field in stated:
+    for field in wanted.columns:
         if field not in QUANTITIES:
-            raise LogError(f"{where}: column map: unknown name '{field}'; {nearest(field, QUANTITIES)}")
+            raise LogError(f"{path}: column map: unknown name '{field}'; {nearest(field, QUANTITIES)}")
 
 
 def column_values(table: Table, column: Column) -> Floats:
@@ -303,10 +306,9 @@ def _by_ending(field: str, name: str) -> Column:
 
 def summed(parts: Sequence[Sequence[Channel]]) -> tuple[Channel, ...]:
     """Columns of several files, those of equal name and role as one."""
-    counts: dict[tuple[str, str], int] = {}
-    for channel in (channel for part in parts for channel in part):
-        key = channel.name, channel.role
-        counts[key] = counts.get(key, 0) + channel.count
+    counts = Counter[tuple[str, str]]()
+    for channel in itertools.chain.from_iterable(parts):
+        counts[channel.name, channel.role] += channel.count
     return tuple(Channel(name, "column", count, role) for (name, role), count in counts.items())
 
 

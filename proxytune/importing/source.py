@@ -117,6 +117,11 @@ class Wanted:
     kind: str = ""  # kind of the commands, one of `proxytune.logs.COMMANDS`, where the source does not say
     vesc: Path | None = None  # the vesc.yaml of a car whose bag has what its VESC was sent
 
+    @property
+    def without_commands(self) -> bool:
+        """True if the log is to have no commands."""
+        return "none" in (self.commands, self.kind)
+
 
 @dataclass(frozen=True)
 class Facts:

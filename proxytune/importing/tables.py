@@ -50,7 +50,7 @@ def find_commands(path: Path, wanted: Wanted) -> Path | None:
     It is the one asked for, else the first that lies beside the poses: run1_commands, run1_cmd_vel, run1_cmd for
     run1.csv, then commands, cmd_vel, cmd; each as .csv, .tsv or .txt.
     """
-    if wanted.commands == "none" or wanted.kind == "none":
+    if wanted.without_commands:
         return None
     if wanted.commands:
         places = (Path(wanted.commands), path.parent / wanted.commands)
@@ -138,7 +138,7 @@ def read_csv_tables(path: Path, wanted: Wanted) -> Source:
     Separators are commas, semicolons, tabs or blanks; lines that begin with # are comments. A command counts as issued
     in each row in which it stands. Commands may be in a second file (`find_commands`).
     """
-    check_fields(wanted.columns, str(path))
+    check_fields(path, wanted)
     files = _files(path, wanted)
     recordings = [_read_recording(file, wanted, alone=len(files) == 1) for file in files]
     whole = _together("folder of CSV files" if path.is_dir() else "CSV table", [source for source, *_ in recordings])
@@ -186,20 +186,18 @@ def _read_recording(file: Path, wanted: Wanted, *, alone: bool) -> tuple[Source,
     columns = with_drives(table, columns)
     poses = poses_by_drive(table, columns, gaps=True)
     commands: dict[str, Commands] = commands_by_drive(table, columns, kind) if kind != "none" else {}
-    if commands or wanted.commands == "none":
-        apart = None
     for label in commands:
         if label not in poses:
             raise LogError(f"{file}: drive '{label}' has commands but no poses; leave its rows out")
     names = [label if label and alone else "_".join(filter(None, (file.stem, label))) for label in poses]
     drives = tuple(Drive(name, commands.get(label), poses[label]) for name, label in zip(names, poses, strict=True))
     notes = (f"Columns: {described(columns)}.", *gaps_note(table, columns))
-    return Source("", drives, tuple(channels_of(table, columns)), notes), tuple(poses), apart
+    return Source("", drives, tuple(channels_of(table, columns)), notes), tuple(poses), None if commands else apart
 
 
 def _columns(table: Table, wanted: Wanted, apart: Path | None) -> tuple[Columns, str]:
     """The columns of a table of poses that are used, and the kind of its commands; "none" where it has none."""
-    own = wanted.commands == "" and wanted.kind != "none"
+    own = not (wanted.commands or wanted.without_commands)
     fields = ("time", "episode", *POSE, *(("command_time", *COMMAND_FIELDS) if own else ()))
     stated = {
         field: entry
@@ -250,7 +248,7 @@ def read_mrclam(path: Path, wanted: Wanted) -> Source:
     channels = _channels(table, MRCLAM_POSES, "poses")
     notes = [f"{robot}: poses from {table.path.name}, in m and rad."]
     commands = None
-    if "none" not in (wanted.commands, wanted.kind):
+    if not wanted.without_commands:
         table = read_text_table(folder / f"{robot}_Odometry.dat", MRCLAM_COMMANDS)
         commands = commands_by_drive(table, own_columns(MRCLAM_COMMANDS), "twist")[""]
         channels += _channels(table, MRCLAM_COMMANDS, "commands")
@@ -268,7 +266,7 @@ def _robots(folder: Path) -> list[str]:
 
 def _channels(table: Table, fields: tuple[str, ...], role: str) -> list[Channel]:
     own = channels_of(table, own_columns(fields))
-    return [Channel(f"{table.path.name}: {one.name}", one.kind, one.count, role) for one in own]
+    return [replace(one, name=f"{table.path.name}: {one.name}", role=role) for one in own]
 
 
 COLUMNS = ("time", *(field for field in POSE if field != "heading"))
@@ -286,7 +284,7 @@ def is_tum(path: Path) -> bool:
 
 def read_tum(path: Path, wanted: Wanted) -> Source:
     """Read TUM trajectories, a drive each, and the commands of each from a second file (`find_commands`)."""
-    check_fields(wanted.columns, str(path))
+    check_fields(path, wanted)
     parts = [_read_one(file, wanted) for file in (sorted(path.glob("*.tum")) if path.is_dir() else [path])]
     return _together(f"{len(parts)} TUM trajectories" if len(parts) > 1 else "TUM trajectory", parts)
 
@@ -296,7 +294,7 @@ def _read_one(path: Path, wanted: Wanted) -> Source:
     columns = own_columns(COLUMNS)
     drive = Drive(path.stem, None, poses_by_drive(table, columns)[""])
     source = Source("TUM trajectory", (drive,), tuple(channels_of(table, columns)), (f"Poses: {described(columns)}.",))
-    if "none" in (wanted.commands, wanted.kind):
+    if wanted.without_commands:
         return source
     if (file := find_commands(path, wanted)) is None:
         lay = f"lay {path.stem}_commands.csv (time, v, omega) beside it, name another file with --commands FILE"

@@ -91,13 +91,12 @@ def choose(topics: tuple[Topic, ...], wanted: Wanted, where: str) -> Choice:
     """Choose topics by what is wanted, else by type, name and number of messages."""
     if wanted.kind and wanted.kind not in COMMANDS:
         raise LogError(f"{where}: unknown kind of commands '{wanted.kind}'; {nearest(wanted.kind, COMMANDS)}")
-    without = "none" in (wanted.commands, wanted.kind)
     of_kind = COMMAND_ROLE
     if wanted.kind and not wanted.commands:
         ranks = {name: rank for name, rank in COMMAND_ROLE.ranks.items() if KIND_OF[name] in ("", wanted.kind)}
         of_kind = replace(COMMAND_ROLE, ranks=ranks)
-    commands = None if without else _choose(of_kind, topics, wanted.commands, where)
-    if not without and commands is None:
+    commands = None if wanted.without_commands else _choose(of_kind, topics, wanted.commands, where)
+    if not wanted.without_commands and commands is None:
         raise LogError(f"{_nothing(COMMAND_ROLE, topics, where)}, or take a log without commands by --commands none")
     transform = wanted.poses if ">" in wanted.poses else ""
     role = replace(POSE_ROLE, ranks={"TFMessage": 0, "tfMessage": 0}) if transform else POSE_ROLE
@@ -115,7 +114,7 @@ def roles_of(choice: Choice) -> tuple[tuple[Role, Topic | None], ...]:
 
 def channels_of(topics: tuple[Topic, ...], choice: Choice) -> tuple[Channel, ...]:
     """Every topic with what it is taken for, or why it is left out."""
-    return tuple(Channel(topic.name, topic.kind, topic.count, _part(topic, choice)) for topic in topics)
+    return tuple(Channel(topic.name, topic.kind, topic.count, _taken_for(topic, choice)) for topic in topics)
 
 
 def notes_of(topics: tuple[Topic, ...], choice: Choice) -> tuple[str, ...]:
@@ -157,7 +156,7 @@ def _nothing(role: Role, topics: tuple[Topic, ...], where: str) -> str:
     return f"{where}: no topic has {role.name}, which are messages of type {', '.join(role.ranks)}; record one"
 
 
-def _part(topic: Topic, choice: Choice) -> str:
+def _taken_for(topic: Topic, choice: Choice) -> str:
     roles = roles_of(choice)
     for role, taken in roles:
         if topic == taken:
@@ -179,7 +178,7 @@ def read_bag(path: Path, wanted: Wanted) -> Source:
     """
     bags = bags_in(path)
     topics, notes = _list(path, bags)
-    choice = choose(topics, wanted, f"{path}")
+    choice = choose(topics, wanted, str(path))
     if choice.of_transforms and not choice.transform:
         first = next(iter(bags.values()))
         with open_bag(first) as opened:

@@ -98,16 +98,25 @@ NEXT = " Next: "
 """What the sentence of a study has before its last part."""
 
 
+def added_effects(diagnosis: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    """The effects that were added, those on motion first."""
+    return [*diagnosis["effects"], *(diagnosis["camera"] or {}).get("effects", ())]
+
+
+def extended_parameters(diagnosis: Mapping[str, Any]) -> dict[str, Any]:
+    """The parameters of the extended model with all that is known of each, by name in θ."""
+    return {**diagnosis["extended"], **(diagnosis["camera"] or {}).get("extended", {})}
+
+
 def lacking(diagnosis: Mapping[str, Any]) -> str:
     """List what the proxy lacks, as in "a dead band and a turn slip"; empty where it has no name."""
-    camera = diagnosis["camera"] or {}
-    names = [effect["name"] for effect in (*diagnosis["effects"], *camera.get("effects", ()))]
-    return report.listed([report.plain(name) for name in dict.fromkeys(names)])
+    names = dict.fromkeys(effect["name"] for effect in added_effects(diagnosis))
+    return report.listed([report.plain(name) for name in names])
 
 
 def answer(diagnosis: Mapping[str, Any], rows: Sequence[Compared]) -> str:
     """Say what the simulator lacked, and what it is worth to declare it."""
-    verdict, effects = diagnosis["verdict"], (*diagnosis["effects"], *(diagnosis["camera"] or {}).get("effects", ()))
+    verdict, effects = diagnosis["verdict"], added_effects(diagnosis)
     if all(row.after is None for row in rows):
         only = f"{rows[0].title}: {level_text(rows[0].before, rows[0].unit)}."
         return f"The log shows nothing to extend the simulator by (verdict: {verdict}). {only}"
@@ -124,8 +133,8 @@ def answer(diagnosis: Mapping[str, Any], rows: Sequence[Compared]) -> str:
 
 def theta_table(before: Known, after: Known | None, diagnosis: Mapping[str, Any]) -> report.Table:
     """θ before and after: what scores alone told, what the log tells, and what the extended proxy has."""
-    logged = {**diagnosis["extended"], **(diagnosis["camera"] or {}).get("extended", {})}
-    measured = {name: (one["value"], one.get("interval")) for name, one in logged.items() if one["value"] is not None}
+    logged = extended_parameters(diagnosis).items()
+    measured = {name: (one["value"], one.get("interval")) for name, one in logged if one["value"] is not None}
     extended = {} if after is None else {**{name: (value, None) for name, (value, _) in measured.items()}, **after}
     rows = []
     for name in dict.fromkeys((*before, *measured, *extended)):
@@ -160,7 +169,7 @@ def following(diagnosis: Mapping[str, Any], studied: str, model: str, theta: The
         return f"No θ explains the scores, and this log does not tell why: log drives{shows}."
     if not model:
         return f"{step[:1].upper()}{step[1:]}"
-    known = {**diagnosis["extended"], **(diagnosis["camera"] or {}).get("extended", {})}
+    known = extended_parameters(diagnosis)
     rest = [f"{report.plain(name)} {value:.4g}" for name, value in theta.items() if name not in known]
     left = f"; what the log does not show is known from scores alone: {report.listed(rest)}" if rest else ""
     return f"Run your simulator with {model}, which was fitted to the log{left}."
@@ -177,12 +186,10 @@ def level_text(level: Level | None, unit: str) -> str:
 
 def floor_text(level: Level | None, unit: str) -> str:
     """The noise floor: a value with its interval, or the two ends of a bracket."""
-    if level is None or (level.floor is None and level.floor_ends is None):
-        return "–"
-    if level.floor is None and level.floor_ends:
-        return f"{report.short_span(*level.floor_ends)}{unit and ' '}{unit}"
-    assert level.floor is not None
-    return level_text(Level(level.floor, level.floor_ends, chance=level.chance), unit)
+    if level is not None and level.floor is not None:
+        return level_text(Level(level.floor, level.floor_ends, chance=level.chance), unit)
+    ends = level and level.floor_ends
+    return f"{report.short_span(*ends)}{unit and ' '}{unit}" if ends else "–"
 
 
 def _change(row: Compared) -> str:

@@ -60,8 +60,8 @@ class _Closing:
         self._measure_target()
         before = self._tune("study", open_study(self.settings.path))
         diagnosis = self._diagnose()
-        after, held_out, camera = None, None, diagnosis["camera"] or {}
-        if diagnosis["effects"] or camera.get("effects") or diagnosis.get("learnt", {}).get("used"):
+        after, held_out = None, None
+        if comparison.added_effects(diagnosis) or diagnosis.get("learnt", {}).get("used"):
             after = self._tune("extended study", self._extend())
             held_out = self._held_out(before, after)
         closed = Closed(self.loop, before, diagnosis, after, held_out, (), self.episodes)
@@ -183,9 +183,6 @@ class _Closing:
         return [names, dict(settings.aliases), settings.starts, settings.seed, dict(settings.domain.values), code]
 
 
-COLUMNS = report.columns_of(("",), ("before", "after"))
-
-
 @dataclass(frozen=True, repr=False)
 class LoopReport(report.Shown):
     """A closed loop: before and after.
@@ -197,7 +194,7 @@ class LoopReport(report.Shown):
     closed: Closed
 
     def __repr__(self) -> str:
-        return f"LoopReport: {view_of(self.closed).sentence}"
+        return f"LoopReport: {comparison.answer(self.closed.diagnosis, rows_of(self.closed))}"
 
     def view(self) -> report.View:
         """What the page shows."""
@@ -305,11 +302,11 @@ def view_of(closed: Closed) -> report.View:
     home, shown = closed.loop.home, []
     if closed.after:
         shown = [report.picture_of("loop", "prpv", comparison.prpv_figure(rows)), *read_pictures(home)]
-    found = (closed.diagnosis["effects"], (closed.diagnosis["camera"] or {}).get("effects"))
+    of_camera = (closed.diagnosis["camera"] or {}).get("effects")
     for name in report.CAPTIONS["loop"]:
         # Of the camera there is a figure where it lacked nothing too
         file = home / "diagnosed" / f"{name}.svg"
-        if file.is_file() and (found[1] or not name.startswith("camera")):
+        if file.is_file() and (of_camera or not name.startswith("camera")):
             shown.append(report.picture_of("loop", name, file.read_bytes()))
     lacks = comparison.lacking(closed.diagnosis) or "nothing that has a name"
     said = (
@@ -358,7 +355,8 @@ def _table(closed: Closed, rows: list[comparison.Compared]) -> report.Table:
         )
     if same:
         notes.append(f"the same before and after: {'; '.join(same)}")
-    return report.Table("Before and after", COLUMNS, tuple(cells), tuple(notes))
+    columns = report.columns_of(("",), ("before", "after"))
+    return report.Table("Before and after", columns, tuple(cells), tuple(notes))
 
 
 def _theta_table(closed: Closed) -> report.Table:

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from rich.console import Group
 from rich.text import Text
 
-from proxytune.diagnosis import CameraDiagnosis, Diagnosis, Estimate, LogDiagnosis, PictureError, Ratio, Rmse
+from proxytune.diagnosis import CameraDiagnosis, Diagnosis, LogDiagnosis, PictureError, Ratio, Rmse
 from proxytune.report.diagnosis import document
 from proxytune.report.diagnosis.camera_figures import camera_figures
 from proxytune.report.diagnosis.camera_notes import camera_headline, camera_notes
@@ -20,7 +20,7 @@ from proxytune.report.export.ros import commands_text, player_text
 from proxytune.report.html import write_page
 from proxytune.report.meanings import findings, fitted
 from proxytune.report.text import group_texts, table_text
-from proxytune.report.view import Drawn, Paragraphs, Picture, Table, View, columns_of, foot_of
+from proxytune.report.view import Column, Drawn, Paragraphs, Picture, Table, View, columns_of, foot_of
 from proxytune.report.wording import fixed, short, span
 from proxytune.report.writing import CAPTIONS, picture_of, save_figures, write_text
 
@@ -127,7 +127,7 @@ def _motion_tables(diagnosis: Diagnosis) -> list[Table]:
     tried = tuple((one.effect, one.form, f"{one.gain:.1f}", f"{one.p_value:.3f}") for one in first)
     title, heads = "Error on held-out drives: RMSE of position [mm]", ("before", "after", "after / before")
     return [
-        _parameters_table("Fitted parameters", diagnosis.declared, diagnosis.theta),
+        _parameters_table("Fitted parameters", diagnosis),
         Table(title, columns_of(("window",), (*heads, "noise floor")), tuple(rows)),
         Table("Effects tried, best first", columns_of(("effect", "form"), ("log-likelihood gain [nats]", "p")), tried),
     ]
@@ -147,20 +147,20 @@ def _camera_tables(diagnosis: CameraDiagnosis) -> list[Table]:
         rows.append((name, *both, "" if floor is None else f"{floor:.{decimals}f}", str(frames)))
     heads = columns_of(("error",), ("before", "after", "floor", "frames"))
     return [
-        _parameters_table("Fitted parameters of the camera", diagnosis.declared, diagnosis.theta),
+        _parameters_table("Fitted parameters of the camera", diagnosis),
         Table("Error on frames kept aside", heads, tuple(rows)),
     ]
 
 
-def _parameters_table(title: str, declared: Mapping[str, Estimate], theta: Mapping[str, Estimate]) -> Table:
+def _parameters_table(title: str, diagnosis: Diagnosis | CameraDiagnosis) -> Table:
     """Fitted parameters before and after effects were added, by name in θ."""
     rows = []
-    for name, after in theta.items():
+    for name, after in diagnosis.theta.items():
         if name.endswith(".imbalance") and after.value == 0.0:
             continue
         low, high = after.interval
-        old = short(declared[name].value, 4) if name in declared else ""
+        old = short(diagnosis.declared[name].value, 4) if name in diagnosis.declared else ""
         interval = f"{short(low, 4)} to {short(high, 4)}" if low < high else ""
         rows.append((name, old, short(after.value, 4), interval, after.unit))
     heads = columns_of(("parameter",), ("declared only", "effects added", "95 % interval"))
-    return Table(title, (*heads, *columns_of(("unit",))), tuple(rows))
+    return Table(title, (*heads, Column("unit")), tuple(rows))

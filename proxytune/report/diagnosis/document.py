@@ -130,11 +130,11 @@ def _parameters_document(
     return estimates_document({names[name]: theta[name] for name in effect.names if name in theta})
 
 
-def _effect_document(effect: AdoptedEffect, theta: Mapping[str, Estimate], catalogue: Catalogue) -> dict[str, Any]:
+def _effect_document(effect: AdoptedEffect, diagnosis: Diagnosis, theta: Mapping[str, Estimate]) -> dict[str, Any]:
     return {
         "name": effect.effect,
         "form": effect.form,
-        "parameters": _parameters_document(effect, theta, catalogue),
+        "parameters": _parameters_document(effect, theta, diagnosis.robot.catalogue),
         "held_out_gain": effect.gain,
         "p_value": effect.p_value,
         "indistinguishable_from": [rival.effect for rival in effect.rivals],
@@ -145,7 +145,7 @@ def motion_effects(diagnosis: Diagnosis) -> list[dict[str, Any]]:
     """The effects of motion that were added, as `diagnose --json` has them."""
     return [
         {
-            **_effect_document(effect, diagnosis.theta, diagnosis.robot.catalogue),
+            **_effect_document(effect, diagnosis, diagnosis.theta),
             "worth": _worth_document(diagnosis.effect_sizes.get(effect.effect, {})),
             "at_edge": list(diagnosis.at_edge(effect)),
         }
@@ -164,7 +164,7 @@ def _immaterial_document(effect: AdoptedEffect, diagnosis: Diagnosis) -> dict[st
         "may_matter": not worth or may_matter(worth, diagnosis.rules.material_factor),
         "worth": _worth_document(worth),
     }
-    return _effect_document(effect, diagnosis.dropped_values, diagnosis.robot.catalogue) | evidence | open_
+    return _effect_document(effect, diagnosis, diagnosis.dropped_values) | evidence | open_
 
 
 def _worth_document(worth: EffectSize) -> dict[str, Any]:

@@ -109,7 +109,7 @@ def run(arguments: argparse.Namespace) -> Answer:
     """Score one proxy, or rank several."""
     _sides_given(arguments)
     if arguments.table:
-        report.check_table_file("--table", arguments.table)
+        report.check_table_file(arguments.table)
         given = (*arguments.proxy, *arguments.target)
         check_place(arguments.table, inputs=[split_source(source)[0] for source in given])
     if arguments.output:

@@ -28,7 +28,7 @@ HORIZON = "2"
 """The windows [s] whose error tells what an effect is worth, where there are such."""
 
 
-def what_it_does(effect: str, catalogue: Catalogue = SHIPPED) -> str:
+def what_it_does(effect: str, catalogue: Catalogue) -> str:
     """What an effect does, in a clause: the first of its docstring; empty where it has none."""
     said = (inspect.getdoc(catalogue.effect(effect)) or "").partition("\n\n")[0].replace("\n", " ").replace("`", "")
     clause = min((said.partition(end)[0] for end in (": ", "; ", ". ")), key=len).rstrip(".")

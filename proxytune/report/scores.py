@@ -71,9 +71,7 @@ def score_next_step(assessments: Assessments, selection: Selection | None) -> st
     return "see below which pairs it ranks wrongly; tune its parameters with `python -m proxytune study`."
 
 
-def score_text(
-    assessments: Assessments, selection: Selection | None, left_out: Sequence[str] = (), *, target: str
-) -> Group:
+def score_text(assessments: Assessments, selection: Selection | None, left_out: Sequence[str], *, target: str) -> Group:
     """The scores as `score` prints them: the sentence, every measure of one proxy or several ranked, and notes."""
     notes = _remarks(assessments, "note")
     if selection is None:

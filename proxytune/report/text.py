@@ -84,10 +84,10 @@ IN_LATEX: dict[str, str] = package_table("report/templates/latex.toml")
 Cell = str | float | None
 
 
-def check_table_file(option: str, path: Path) -> None:
+def check_table_file(path: Path) -> None:
     """Refuse a file of another kind before anything is worked out."""
     if path.suffix not in ENDINGS:
-        raise InputError(f"{option} {path}: a table is written as {' or '.join(ENDINGS)}; name the file so")
+        raise InputError(f"--table {path}: a table is written as {' or '.join(ENDINGS)}; name the file so")
 
 
 def latex_text(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

@@ -180,7 +180,7 @@ def test_a_frame_and_its_picture_depend_on_their_time_alone_and_a_side_that_has_
 def test_a_gif_has_every_frame_at_its_time_and_plays_for_ever(animation, tmp_path):
     path = tmp_path / "new" / "episode.gif"
     shown = animation.times[:21]
-    write_gif(path, map(animation.frame, shown), [*map(animation.frame, shown[::10])], FRAME_HZ)
+    write_gif(path, map(animation.frame, shown), [*map(animation.frame, shown[::10])])
     with Image.open(path) as gif:
         assert (gif.n_frames, gif.info["duration"], gif.info["loop"]) == (21, 100, 0)
         gif.seek(12)
@@ -193,14 +193,14 @@ def test_a_gif_has_every_frame_at_its_time_and_plays_for_ever(animation, tmp_pat
 def test_an_mp4_is_every_pixel_of_every_frame_given_to_ffmpeg(program, tmp_path):
     program(ENCODER)
     frames = [np.full((6, 8, 3), grey, np.uint8) for grey in (0, 100, 200)]
-    write_mp4(tmp_path / "episode.mp4", frames, FRAME_HZ)
+    write_mp4(tmp_path / "episode.mp4", frames)
     assert (tmp_path / "episode.mp4").read_text() == f"{3 * 6 * 8 * 4} bytes"
 
 
 def test_an_encoder_that_fails_is_told_in_one_line_and_leaves_nothing(program, tmp_path, caplog):
     program(BROKEN)
     with pytest.raises(RunError) as problem:
-        write_mp4(tmp_path / "episode.mp4", [np.zeros((6, 8, 3), np.uint8)], FRAME_HZ)
+        write_mp4(tmp_path / "episode.mp4", [np.zeros((6, 8, 3), np.uint8)])
     assert str(problem.value).endswith(
         "episode.mp4: ffmpeg cannot encode it (Unknown encoder 'h264'); write a .gif instead"
     )

@@ -50,4 +50,4 @@ def test_a_csv_reads_back_and_what_is_undefined_is_empty(tmp_path):
 @pytest.mark.parametrize("name", ["t.txt", "t", "t.TEX"])
 def test_a_file_of_another_kind_is_refused(name):
     with pytest.raises(InputError, match=rf"--table {name}: a table is written as .csv or .tex; name the file so"):
-        check_table_file("--table", Path(name))
+        check_table_file(Path(name))

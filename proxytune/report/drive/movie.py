@@ -177,11 +177,11 @@ def write_episode(pair: SideBySide, metrics: Sequence[str], path: Path) -> None:
         bars.begin("drawing", 0)
         frames = _count_frames(animation, bars)
         if path.suffix.lower() == MP4:
-            write_mp4(path, frames, FRAME_HZ)
+            write_mp4(path, frames)
         else:
             # Three frames that show every colour: of the beginning, the middle and the end
             shown = (animation.times[place] for place in (0, len(animation.times) // 2, -1))
-            write_gif(path, frames, [*map(animation.frame, shown)], FRAME_HZ)
+            write_gif(path, frames, [*map(animation.frame, shown)])
 
 
 def _count_frames(animation: Animation, watcher: Watcher) -> Iterator[Frame]:
@@ -190,13 +190,13 @@ def _count_frames(animation: Animation, watcher: Watcher) -> Iterator[Frame]:
         watcher.episode()
 
 
-def write_gif(path: Path, frames: Iterable[Frame], samples: Sequence[Frame], frame_hz: float) -> None:
+def write_gif(path: Path, frames: Iterable[Frame], samples: Sequence[Frame]) -> None:
     """Write a GIF of frames (rows, columns, 3) that plays for ever; its palette is made from the samples."""
     # Without k-means the white of the ground turns grey where pictures have many colours
     palette = Image.fromarray(np.concatenate(list(samples))).quantize(PALETTE_SIZE, kmeans=2, dither=Image.Dither.NONE)
     pictures = (Image.fromarray(frame).quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames)
     first = next(pictures)
-    how = {"save_all": True, "append_images": pictures, "duration": round(1000.0 / frame_hz), "loop": 0}
+    how = {"save_all": True, "append_images": pictures, "duration": round(1000.0 / FRAME_HZ), "loop": 0}
     write_whole(path, lambda draft: first.save(draft, format="GIF", optimize=True, **how), what="the animation ")
 
 
@@ -210,14 +210,14 @@ def find_ffmpeg() -> str:
         raise InputError("an .mp4 takes ffmpeg: pip install imageio-ffmpeg, or write a .gif") from None
 
 
-def write_mp4(path: Path, frames: Iterable[Frame], frame_hz: float) -> None:
+def write_mp4(path: Path, frames: Iterable[Frame]) -> None:
     """Write an MP4 of frames (rows, columns, 3), whose numbers of rows and columns are even; refused without ffmpeg."""
     log = logging.getLogger("matplotlib.animation")
     level = log.level
     log.setLevel(logging.ERROR)  # What ffmpeg said is said in one line
     try:
         with matplotlib.rc_context({"animation.ffmpeg_path": find_ffmpeg()}):
-            write_whole(path, lambda draft: _encode(draft, iter(frames), frame_hz), what="the animation ")
+            write_whole(path, lambda draft: _encode(draft, iter(frames)), what="the animation ")
     except subprocess.CalledProcessError as problem:
         said = f"{problem.stderr}".strip().splitlines()[-1:] or [f"exit status {problem.returncode}"]
         raise RunError(f"{path}: ffmpeg cannot encode it ({said[0]}); write a .gif instead") from None
@@ -225,12 +225,12 @@ def write_mp4(path: Path, frames: Iterable[Frame], frame_hz: float) -> None:
         log.setLevel(level)
 
 
-def _encode(path: Path, frames: Iterator[Frame], frame_hz: float) -> None:
+def _encode(path: Path, frames: Iterator[Frame]) -> None:
     first = next(frames)
     figure = Figure(figsize=(first.shape[1] / DPI, first.shape[0] / DPI), dpi=DPI)
     shown = figure.figimage(first)
     # The draft's name does not end in .mp4
-    writer = FFMpegWriter(fps=round(frame_hz), codec="h264", extra_args=["-f", "mp4"])
+    writer = FFMpegWriter(fps=FRAME_HZ, codec="h264", extra_args=["-f", "mp4"])
     with writer.saving(figure, str(path), DPI):
         writer.grab_frame()
         for frame in frames:

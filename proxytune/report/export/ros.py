@@ -91,7 +91,7 @@ RATE_HZ = 60.0
 """How often the node tells the driver a velocity; it is also the tick of proxytune's own plants."""
 
 
-def node_text(instance: Instance, has: Sequence[str] = ()) -> str:
+def node_text(instance: Instance, has: Sequence[str]) -> str:
     """The node as a Python file: all values in it, no other file needed."""
     names = REQUIRED[instance.robot.drive]
     known = {

@@ -2,12 +2,14 @@
 
 import math
 import tomllib
+from collections.abc import Iterator
 from xml.sax.saxutils import escape
 
 import numpy as np
 
 from proxytune.driving import orientation
 from proxytune.report.export.instance import Instance, xml_comment
+from proxytune.report.export.urdf import numbers_text
 from proxytune.report.writing import fill
 
 TIMESTEP_S = 0.0005
@@ -49,40 +51,18 @@ def mjcf_text(instance: Instance) -> str:
     said = {key: f"{number:.9g}" for key, number in numbers.items()}
     own = tomllib.loads(fill("mujoco_parts.toml", **said))
     if wheelbase:  # A servo of the mean speed of the rear wheels, and one of the front wheel's angle
-        # Its torque = stiffness · (full angle · (gain · command + offset) − angle).
-        stiffness = armature * STEERS_HZ**2
-        full = stiffness * math.radians(instance.figure("wheel_angle"))
-        limit = instance.value("steering_saturation", "limit", 1.0)
-        offset, gain = instance.value("steering_offset", "offset", 0.0), instance.value("steering_gain", "gain", 1.0)
-        words = [
-            f'    <general name="steering" joint="steering" gainprm="{full * gain:.9g}" biastype="affine"',
-            f'biasprm="{full * offset:.9g} {-stiffness:.9g} 0" ctrllimited="true" ctrlrange="{-limit:.9g} {limit:.9g}"',
-            *_follows(instance, instance.value("steering_lag", "time_constant", 0.0) - 2.0 / STEERS_HZ),
-        ]
-        actuators = [_speed_servo(instance, 'name="throttle" tendon="rear"', 0, 2), " ".join(words) + "/>"]
+        rear = _speed_servo(instance, 'name="throttle" tendon="rear"', 0, 2)
+        actuators = [rear, _steering_servo(instance, armature * STEERS_HZ**2)]
     else:
         sides = enumerate(("left", "right"))
         actuators = [_speed_servo(instance, f'name="{one}" joint="axle_{one}"', side, 1) for side, one in sides]
-    parts = []
-    if (camera := instance.camera) is not None:
-        # It looks along its −z axis; its x axis is the picture's right, its y axis the picture's top.
-        turned = orientation(camera)
-        edges = np.concatenate((-turned[:, 1], turned[:, 2])).tolist()
-        axes = " ".join(f"{round(value, 12) + 0.0:.9g}" for value in edges)
-        place, size = f"{camera.forward_m:.9g} 0 {camera.height_m:.9g}", f"{camera.columns} {camera.rows}"
-        looks = f'xyaxes="{axes}" fovy="{camera.field_of_view_deg:.9g}" resolution="{size}"'
-        parts.append(f'<camera name="camera" pos="{place}" {looks}/>')
-    if (tracked := instance.tracked_point) is not None:
-        forward, left, angle = tracked
-        turn = f"{math.cos(angle / 2.0):.9g} 0 0 {math.sin(angle / 2.0):.9g}"
-        parts.append(f'<site name="tracked_point" pos="{forward:.9g} {left:.9g} 0" quat="{turn}"/>')
     return fill(
         "mujoco.xml.txt",
         **said,
         name=name,
         comment=xml_comment(instance, "mjcf", 7),
         chassis_size=f"{length / 2.0:.6g} {0.35 * baseline:.6g} {height / 2.0:.6g}",
-        parts="\n".join([own["front_wheel" if wheelbase else "caster"], *(f"      {part}" for part in parts)]),
+        parts="\n".join([own["front_wheel" if wheelbase else "caster"], *_mounted(instance)]),
         control="throttle and steering (left is above 0)" if wheelbase else "duties of the left and right wheels",
         excluded='    <exclude body1="$name" body2="wheel_front"/>\n'.replace("$name", name) if wheelbase else "",
         tendons=own["open_differential"] if wheelbase else "",
@@ -104,6 +84,34 @@ def _speed_servo(instance: Instance, place: str, side: int, wheels: int) -> str:
         *_follows(instance, instance.lags_s[side] - SERVO_S),
     ]
     return "    " + " ".join(words) + "/>"
+
+
+def _steering_servo(instance: Instance, stiffness: float) -> str:
+    """A servo of the front wheel: torque = stiffness · (full angle · (gain · command + offset) − angle)."""
+    full = stiffness * math.radians(instance.figure("wheel_angle"))
+    limit = instance.value("steering_saturation", "limit", 1.0)
+    offset, gain = instance.value("steering_offset", "offset", 0.0), instance.value("steering_gain", "gain", 1.0)
+    words = [
+        f'<general name="steering" joint="steering" gainprm="{full * gain:.9g}" biastype="affine"',
+        f'biasprm="{full * offset:.9g} {-stiffness:.9g} 0" ctrllimited="true" ctrlrange="{-limit:.9g} {limit:.9g}"',
+        *_follows(instance, instance.value("steering_lag", "time_constant", 0.0) - 2.0 / STEERS_HZ),
+    ]
+    return "    " + " ".join(words) + "/>"
+
+
+def _mounted(instance: Instance) -> Iterator[str]:
+    """The camera and the tracked point, where there are such."""
+    if (camera := instance.camera) is not None:
+        # It looks along its −z axis; its x axis is the picture's right, its y axis the picture's top.
+        turned = orientation(camera)
+        axes = numbers_text(np.concatenate((-turned[:, 1], turned[:, 2])))
+        place, size = f"{camera.forward_m:.9g} 0 {camera.height_m:.9g}", f"{camera.columns} {camera.rows}"
+        looks = f'xyaxes="{axes}" fovy="{camera.field_of_view_deg:.9g}" resolution="{size}"'
+        yield f'      <camera name="camera" pos="{place}" {looks}/>'
+    if (tracked := instance.tracked_point) is not None:
+        forward, left, angle = tracked
+        turn = f"{math.cos(angle / 2.0):.9g} 0 0 {math.sin(angle / 2.0):.9g}"
+        yield f'      <site name="tracked_point" pos="{forward:.9g} {left:.9g} 0" quat="{turn}"/>'
 
 
 def _follows(instance: Instance, lag_s: float) -> list[str]:

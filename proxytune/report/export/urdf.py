@@ -74,8 +74,8 @@ def _set_origin(joint: ET.Element, pose: Floats) -> None:
     if np.allclose(driving.origin_of(joint), pose, atol=1e-12):
         return
     origin = _part(joint, "origin")
-    origin.set("xyz", _numbers(pose[:3, 3]))
-    origin.set("rpy", _numbers(angles_of(pose[:3, :3])))
+    origin.set("xyz", numbers_text(pose[:3, 3]))
+    origin.set("rpy", numbers_text(angles_of(pose[:3, :3])))
 
 
 def _part(element: ET.Element, tag: str, **otherwise: str) -> ET.Element:
@@ -97,5 +97,6 @@ def angles_of(turned: Floats) -> tuple[float, float, float]:
         return tuple(Rotation.from_matrix(turned).as_euler("xyz").tolist())
 
 
-def _numbers(values: Iterable[float]) -> str:
+def numbers_text(values: Iterable[float]) -> str:
+    """Numbers as an attribute of XML has them; what rounds to zero has no sign."""
     return " ".join(f"{round(float(value), 12) + 0.0:.9g}" for value in values)

@@ -156,38 +156,41 @@ def evaluations_figure(result: StudyResult) -> Figure:
     width = max(style.COLUMN, PANEL * columns + 0.5)
     figure = Figure(figsize=(width, 0.9 * width * cells / columns + 0.25), layout="constrained")
     grid = figure.add_gridspec(cells, columns)
-    objective = result.study.objective
-    label = _label(result)
     scores = _scores(result)
     norm = Normalize(min(scores), max(scores))
     pairs = [(column, row) for row in range(1, count) for column in range(row)]
     for column, row in pairs:
         _pair(figure.add_subplot(grid[row - 1, column]), result, (column, row), norm)
-    if not pairs:  # The objective over the range of a single parameter, on its 95 % interval
-        axes, (box,) = figure.add_subplot(grid[0, 0]), result.study.settings.space.intervals
-        look: dict[str, Any] = {"color": style.LIGHT_BLUE, "alpha": 0.35, "linewidth": 0, "label": REGION}
-        axes.axvspan(*result.knowledge.intervals[box.name], **look)
-        points = np.array([[trial.theta[box.name], objective.sign * (trial.score or 0.0)] for trial in result.trials])
-        _scatter_trials(axes, result, points, norm)
-        _mark(axes, [result.best.trial.theta[box.name], result.value_of(result.best.trial) or 0.0], "answer")
-        if objective == PRPV and result.truth is not None and box.name in result.truth:
-            _mark(axes, [result.truth[box.name], 0.0], "truth")
-        axes.set_xlim(box.low, box.high)
-        style.dress(axes, with_unit(box.name, result.study.family.parameters[box.name].unit), label)
+    if not pairs:
+        _single(figure.add_subplot(grid[0, 0]), result, norm)
     floor = ""
-    if objective == PRPV and result.floor.value is not None:
+    if result.study.objective == PRPV and result.floor.value is not None:
         floor = f"\n{style.floor_name(result.floor)} {result.floor.value:.1f}"
     # The colours of the objective and what the marks are stand in the corner that the pairs leave free.
     panels, key = figure.axes[: len(pairs) or 1], figure.add_subplot(grid[0, 1:])
     key.set_axis_off()
     place = key.inset_axes((0.15, 0.8, 0.8, 0.08))
     bar = figure.colorbar(ScalarMappable(norm, style.SHADES), cax=place, orientation="horizontal")
-    bar.ax.set_title(f"{label}{floor}", fontsize=7)
+    bar.ax.set_title(f"{_label(result)}{floor}", fontsize=7)
     bar.ax.tick_params(labelsize=7)
     named = style.named_handles(panels)
-    look = {"loc": "upper center", "fontsize": 7, "frameon": False}
+    look: dict[str, Any] = {"loc": "upper center", "fontsize": 7, "frameon": False}
     key.legend(list(named.values()), list(named), bbox_to_anchor=(0.55, 0.62), **look)
     return figure
+
+
+def _single(axes: Axes, result: StudyResult, norm: Normalize) -> None:
+    """The objective over the range of a single parameter, on its 95 % interval."""
+    objective, (box,) = result.study.objective, result.study.settings.space.intervals
+    look: dict[str, Any] = {"color": style.LIGHT_BLUE, "alpha": 0.35, "linewidth": 0, "label": REGION}
+    axes.axvspan(*result.knowledge.intervals[box.name], **look)
+    points = np.array([[trial.theta[box.name], objective.sign * (trial.score or 0.0)] for trial in result.trials])
+    _scatter_trials(axes, result, points, norm)
+    _mark(axes, [result.best.trial.theta[box.name], result.value_of(result.best.trial) or 0.0], "answer")
+    if objective == PRPV and result.truth is not None and box.name in result.truth:
+        _mark(axes, [result.truth[box.name], 0.0], "truth")
+    axes.set_xlim(box.low, box.high)
+    style.dress(axes, with_unit(box.name, result.study.family.parameters[box.name].unit), _label(result))
 
 
 def _pair(axes: Axes, result: StudyResult, places: tuple[int, int], norm: Normalize) -> None:

@@ -60,7 +60,12 @@ def theta_table(result: StudyResult) -> Table:
     left = percent(result.knowledge.posterior.share)
     rows.append(("share of the box", "", left, *(() if truth is None else ("",)), percent(share), ""))
     heads = ("best", "95 % interval", *(() if truth is None else ("truth",)), "by PRPV alone", "box")
-    space, learnt, notes = result.study.settings.space, result.knowledge, list[str]()  # Most needed first
+    return Table(THETA, columns_of(("parameter",), heads), tuple(rows), (*_theta_notes(result), *result.cautions))
+
+
+def _theta_notes(result: StudyResult) -> list[str]:
+    """Say what is not identified, what is odd about the best θ, and which parameters trade off; most needed first."""
+    space, learnt, notes = result.study.settings.space, result.knowledge, list[str]()
     if learnt.unidentified:
         few = f"{len(result.trials) + result.earlier} trials exclude almost no value of"
         names = listed(list(map(plain, learnt.unidentified)))
@@ -75,7 +80,7 @@ def theta_table(result: StudyResult) -> Table:
         f"(correlation {fixed(correlation, 1)})"
         for one, other, correlation in sorted(learnt.trades, key=lambda pair: -abs(pair[2]))
     ]
-    return Table(THETA, columns_of(("parameter",), heads), tuple(rows), (*notes, *result.cautions))
+    return notes
 
 
 def usefulness_table(result: StudyResult) -> Table:

@@ -8,6 +8,7 @@ from typing import Any
 from rich.console import Group
 
 from proxytune.report.html import write_page
+from proxytune.report.study.document import information_document
 from proxytune.report.study.page import study_foot
 from proxytune.report.text import file_texts, group_texts, table_text
 from proxytune.report.view import Column, Table, View, columns_of
@@ -54,10 +55,7 @@ def bank_document(bank: Bank) -> dict[str, Any]:
             "expected_interval_by_starts": {str(count): bank.widths(count) for count in bank.expected},
             "starts_needed": dict(bank.needed),
             "within": {box.name: WITHIN * (box.high - box.low) for box in bank.settings.space.intervals},
-            "information": {
-                one.name: {"agents": dict(one.agents), "metrics": dict(one.metrics), "limit": one.limit}
-                for one in bank.expected[starts].information
-            },
+            "information": information_document(bank.expected[starts].information),
         },
         "settings": dict(settings_document(bank.settings)),
     }

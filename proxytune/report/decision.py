@@ -63,10 +63,10 @@ def next_sentence(plan: Plan, target: str) -> str:
 
 def sequential_sentence(found: Sequential) -> str:
     """Say what may be concluded after these rollouts, looked at after each."""
-    times = [f"{name} {'over 1000' if n is None else n}" for name, n in found.expected_rounds.items()]
     if found.winner is not None:
         when = f"after {found.decided_at} of {found.rounds} rollouts of each agent"
         return f"{found.winner} is shown to be the best, {when}"
+    times = [f"{name} {'over 1000' if n is None else n}" for name, n in found.expected_rounds.items()]
     lead = max(found.evidence, key=lambda agent: found.evidence[agent])
     wealth = f"{lead} has most evidence, {short(found.evidence[lead])} of {short(found.threshold)}"
     return f"none is shown to be the best after {found.rounds} rollouts of each ({wealth}); expect {', '.join(times)}"
@@ -166,17 +166,16 @@ PROMISED = ("winner", "probability_best", "expected_regret", "not_told_apart", "
 
 def decision_document(assessment: Assessment) -> dict[str, Any]:
     """The decision and what follows from it, as plain JSON whose keys are promises."""
-    decision, saving, plan = assessment.decision, assessment.saves, assessment.next
-    observed, random = decision.observed, assessment.chance
+    decision, plan, random = assessment.decision, assessment.next, assessment.chance
     return {
         "decision": _chosen(decision),
         "observed": {
-            **_panel(observed),
+            **_panel(decision.observed),
             "tasks": {panel.name: _panel(panel) for panel in decision.tasks},
             "without_task": {panel.name: _panel(panel) for panel in decision.without},
         },
         "p_exact": random.p_value if random.exact else None,
-        "saves": _saves(saving),
+        "saves": _saves(assessment.saves),
         "next": dict(plan.rollouts),
         "next_bound": {
             "regret": plan.bound,

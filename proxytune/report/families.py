@@ -11,7 +11,7 @@ from matplotlib.ticker import MaxNLocator, NullFormatter
 from rich.console import Group
 
 from proxytune.report import figure_style as style
-from proxytune.report.scores import differences_document, ends_document
+from proxytune.report.scores import differences_document, score_document
 from proxytune.report.study.document import estimate_document, intervals_document, pairs_document
 from proxytune.report.study.sentence import KnownParameter, known_parameters
 from proxytune.report.teaching import UNKNOWN, count
@@ -253,22 +253,15 @@ def _choice_document(choice: BestFamilies) -> dict[str, Any]:
 
 
 def _family_document(one: TunedFamily, cost: tuple[float, float, float]) -> dict[str, Any]:
-    result, fresh = one.result, one.fresh
-    settings = result.study.settings
+    result, settings = one.result, one.result.study.settings
+    fresh = score_document(one.fresh) if one.fresh else {}
     return {
         "family": settings.family,
         "domain": dict(settings.domain.values),
         "theta": dict(one.theta),
         "theta_interval": intervals_document(result.knowledge.intervals),
         "prpv": pairs_document(result.best.trial.prpv),
-        "fresh": {
-            "prpv": fresh.prpv.value,
-            "prpv_interval": ends_document(fresh.prpv_interval.low, fresh.prpv_interval.high),
-            "noise_floor": fresh.noise_floor.value,
-            "chance": fresh.chance.mean,
-        }
-        if fresh
-        else dict.fromkeys(("prpv", "prpv_interval", "noise_floor", "chance")),
+        "fresh": {key: fresh.get(key) for key in ("prpv", "prpv_interval", "noise_floor", "chance")},
         "seconds_per_episode": cost[0],
         "seconds_per_episode_interval": list(cost[1:]),
         "trials": len(result.trials),

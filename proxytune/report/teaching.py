@@ -82,8 +82,8 @@ def teach_next_step(experiment: teaching.Experiment) -> str:
 
 def say_more(experiment: teaching.Experiment) -> str:
     """Say what to raise: the examinations that are chosen or, of a whole grid, its repetitions."""
-    taught = experiment.settings.teaching
-    if taught is not None and taught.examinations is not None:
+    taught = teaching.teaching_settings(experiment.settings)
+    if taught.examinations is not None:
         return f"raise teaching.examinations from {taught.examinations} to {2 * taught.examinations}"
     seeds = experiment.without.repetitions
     return f"raise teaching.seeds from {seeds} to {2 * seeds}"
@@ -198,8 +198,8 @@ def teach_view(experiment: teaching.Experiment, prpv: Predictivities, figure: Dr
 
 def _published(experiment: teaching.Experiment, rows: Sequence[tuple[str, ...]]) -> tuple[Table, ...]:
     """Published figures of these proxies, beside what is found here; nothing where nothing is given."""
-    taught = experiment.settings.teaching
-    if taught is None or not taught.published:
+    taught = teaching.teaching_settings(experiment.settings)
+    if not taught.published:
         return ()
     here = {row[0]: row for row in rows}
     cells = []

@@ -1,16 +1,19 @@
 """JSON document of a study, as `study --json` prints it; its keys are promises."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from proxytune.learning import LearningEstimate
 from proxytune.report.scores import score_document
 from proxytune.report.study.sentence import study_sentence
 from proxytune.report.wording import Ends
-from proxytune.search import Knowledge
+from proxytune.search import Information, Knowledge
 from proxytune.storage import TrialRecord
 from proxytune.study import PRPV, Confirmation, Preflight, StudyResult, settings_document
 from proxytune.usefulness import Estimate
+
+OF_EPISODES = ("prpv", "prpv_normalised", "prpv_interval", "ppv")
+"""Keys of the scores of a trial's episodes that stand beside its θ, and of fresh ones."""
 
 
 def study_document(result: StudyResult) -> dict[str, Any]:
@@ -48,14 +51,14 @@ def study_document(result: StudyResult) -> dict[str, Any]:
 def _best(result: StudyResult) -> dict[str, Any]:
     """The answer, what is known of it, and its measures in the trial's own episodes and in fresh ones."""
     best, learnt, measures = result.best, result.knowledge, score_document(result.best.assessment)
-    shared, ppv = ("prpv", "prpv_normalised", "prpv_interval", "ppv"), result.expected.ppv if result.expected else None
+    ppv = result.expected.ppv if result.expected else None
     return {
         "index": best.trial.number or None,
         "theta": dict(best.trial.theta),
         "theta_interval": intervals_document(learnt.intervals),
         "region_share": float(learnt.posterior.share),
         "unidentified": list(learnt.unidentified),
-        **{key: measures[key] for key in shared},
+        **{key: measures[key] for key in OF_EPISODES},
         "objective": {"name": result.study.objective.name, "value": result.value_of(best.trial)},
         "fresh": _fresh(result.confirmation, by_prpv=result.study.objective == PRPV),
         "expected_prpv": estimate_document(result.expected.prpv.value if result.expected else None),
@@ -97,7 +100,7 @@ def _fresh(confirmation: Confirmation | None, *, by_prpv: bool) -> dict[str, Any
         return None
     measures = score_document(confirmation.answer.assessment) if confirmation.answer.assessment else {}
     return {
-        **{key: measures.get(key) for key in ("prpv", "prpv_normalised", "prpv_interval", "ppv")},
+        **{key: measures.get(key) for key in OF_EPISODES},
         "optimism": confirmation.answer.optimism,
         "episodes": confirmation.episodes,
         "repetitions": confirmation.repetitions,
@@ -152,14 +155,19 @@ def knowledge_document(learnt: Knowledge) -> dict[str, Any]:
         },
         "trades": [[one, other, float(correlation)] for one, other, correlation in learnt.trades],
         "as_good": {"region_share": float(share), "theta_interval": intervals_document(ends)},
-        "information": {
-            one.name: {
-                "agents": {name: float(share) for name, share in one.agents},
-                "metrics": {name: float(share) for name, share in one.metrics},
-                "limit": one.limit,
-            }
-            for one in learnt.information
-        },
+        "information": information_document(learnt.information),
+    }
+
+
+def information_document(told: Sequence[Information]) -> dict[str, Any]:
+    """The shares of agents and metrics in what is told of each parameter, and what limits it."""
+    return {
+        one.name: {
+            "agents": {name: float(share) for name, share in one.agents},
+            "metrics": {name: float(share) for name, share in one.metrics},
+            "limit": one.limit,
+        }
+        for one in told
     }
 
 

@@ -1,6 +1,6 @@
 """Before and after: each measure of the proxy without what was found and with it, its interval and its noise floor.
 
-`compare_prpv` and `compare_errors` make the rows, `answer` and `following` say what they come to and what to do next,
+`compare_prpv` and `compare_errors` make the rows, `answer` and `next_step` say what they come to and what to do next,
 and `prpv_figure` draws PRPV.
 """
 
@@ -158,7 +158,7 @@ def _known(known: tuple[float, Sequence[float | None] | None] | None) -> str:
     return f"{report.fixed(known[0], places)} ({report.span((low, high), places)})"
 
 
-def following(diagnosis: Mapping[str, Any], studied: str, model: str, theta: Theta) -> str:
+def next_step(diagnosis: Mapping[str, Any], studied: str, model: str, theta: Theta) -> str:
     """Say what to do next, after the diagnosis and the last study that was run."""
     drive, step = diagnosis.get("next_manoeuvre"), studied.rpartition(NEXT)[2]
     if drive and diagnosis["verdict"] in OPEN:

@@ -20,7 +20,7 @@ from proxytune.effects import Catalogue, effect_of
 from proxytune.errors import RunError, SettingsError, StoreError
 from proxytune.extensions import describe
 from proxytune.importing import open_log
-from proxytune.loop.comparison import NEXT, compare_errors, floor_text, following, lacking, level_text, theta_table
+from proxytune.loop.comparison import NEXT, compare_errors, floor_text, lacking, level_text, next_step, theta_table
 from proxytune.loop.opening import Loop, Teller
 from proxytune.report import figures_also_as, findings, write_text
 from proxytune.settings import read_settings
@@ -72,7 +72,7 @@ def read_diagnosis(folder: Path) -> dict[str, Any]:
     path = folder / "diagnosis.json"
     try:
         document: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-        # All that a loop reads is read, so that what is spoilt shows before anything is made of it.
+        # All that a loop reads later is read here, so that a damaged document is refused at once.
         json.dumps(document, allow_nan=False)
         lacking(document), theta_table({}, {}, document)
         for row in compare_errors(document):
@@ -82,7 +82,7 @@ def read_diagnosis(folder: Path) -> dict[str, Any]:
             findings(told["effects"])
             told["verdict"], told["effects"], told["extended"]
         for studied, model in (("", "model.toml"), (f"{NEXT}diagnose", "")):
-            following(document, studied, model, {})
+            next_step(document, studied, model, {})
     except (OSError, ValueError, TypeError, KeyError, AttributeError, OverflowError, RecursionError) as problem:
         raise RunError(f"{path}: cannot be read ({describe(problem)}); remove it and run again") from None
     return document

@@ -24,19 +24,15 @@ from proxytune.usefulness import Assessment, dominance
 
 @dataclass(frozen=True)
 class Closed:
-    """A loop that has come to its end: the study, what `diagnose --json` prints of the log, and the extended study.
-
-    That, and what held-out agents say of both tuned proxies, is None where nothing was found, or there are none. This
-    run has done or gone on with some steps, and driven so many episodes.
-    """
+    """A loop that has come to its end."""
 
     loop: Loop
-    before: StudyReport
-    diagnosis: Mapping[str, Any]
-    after: StudyReport | None
-    held_out: tuple[Assessment, Assessment] | None
-    done: tuple[str, ...]
-    episodes: int
+    before: StudyReport  # the study
+    diagnosis: Mapping[str, Any]  # what `diagnose --json` prints of the log
+    after: StudyReport | None  # the extended study; None where nothing was found
+    held_out: tuple[Assessment, Assessment] | None  # of held-out agents in both tuned proxies; None likewise
+    done: tuple[str, ...]  # the steps that this run has done or gone on with
+    episodes: int  # how many this run has driven
 
 
 def righted(closed: Closed) -> dict[str, Any] | None:
@@ -51,8 +47,7 @@ def righted(closed: Closed) -> dict[str, Any] | None:
     if gains.max() <= 0.0:
         return None
     most = int(gains.argmax())
-    agent = both[0].inputs.agents[most]
-    return {"agent": agent, "wrong_pairs_before": before[most], "wrong_pairs_after": after[most]}
+    return {"agent": both[0].inputs.agents[most], "wrong_pairs_before": before[most], "wrong_pairs_after": after[most]}
 
 
 MOST_STARTS = 4
@@ -85,8 +80,7 @@ def write_pictures(closed: Closed) -> None:
             drawn = episode_figure(pair, metrics)
             save_figure(drawn, path.with_name(f"{name}.png"))
             write_text(path.with_name(f"{name}.svg"), svg_of(drawn).decode("utf-8"))
-            title = f"{agent} beside the target, {name}"
-            texts.append({"file": f"{name}.svg", "title": title, "caption": caption})
+            texts.append({"file": f"{name}.svg", "title": f"{agent} beside the target, {name}", "caption": caption})
     write_text(path, json.dumps(texts, indent=2) + "\n")
 
 
@@ -94,10 +88,9 @@ def read_pictures(home: Path) -> list[Picture]:
     """The pictures that were kept."""
     path = pictures_file(home)
     try:
-        texts = json.loads(path.read_text(encoding="utf-8"))
         return [
             Picture(_text(one["title"]), path.with_name(one["file"]).read_bytes(), _text(one["caption"]))
-            for one in texts
+            for one in json.loads(path.read_text(encoding="utf-8"))
         ]
     except (OSError, ValueError, KeyError, TypeError, RecursionError):
         raise StoreError(f"{path}: cannot be read; remove it to draw the righted agent again") from None

@@ -223,7 +223,7 @@ class LoopReport(report.Shown):
         return {
             "study": closed.loop.settings.name,
             "sentence": comparison.answer(closed.diagnosis, rows_of(closed)),
-            "next": _following(closed),
+            "next": _next_step(closed),
             "steps": list(STEPS) if closed.after else list(STEPS)[:4],
             "verdict": closed.diagnosis["verdict"],
             "effects": closed.diagnosis["effects"],
@@ -292,7 +292,7 @@ def text_of(closed: Closed, page: Path) -> Group:
     rows = rows_of(closed)
     sentence, table = Text(comparison.answer(closed.diagnosis, rows), style="bold"), _table(closed, rows)
     shown, theta = (report.table_text(one, ragged=True) for one in (replace(table, title=""), _theta_table(closed)))
-    following = f"Next: {_following(closed)}"
+    following = f"Next: {_next_step(closed)}"
     return report.group_texts(sentence, shown, *report.note_texts(table.notes), Text(), theta, following, str(page))
 
 
@@ -320,7 +320,7 @@ def view_of(closed: Closed) -> report.View:
     return report.View(
         title=f"{closed.loop.settings.name}: what did the simulator lack, and what is it worth?",
         sentence=comparison.answer(closed.diagnosis, rows),
-        next_step=_following(closed),
+        next_step=_next_step(closed),
         parts=(
             _table(closed, rows),
             _theta_table(closed),
@@ -369,6 +369,6 @@ def _known(tuned: StudyReport) -> comparison.Known:
     return {name: (value, ends.get(name)) for name, value in tuned.theta.items()}
 
 
-def _following(closed: Closed) -> str:
+def _next_step(closed: Closed) -> str:
     last, model = closed.after or closed.before, closed.loop.home / "diagnosed" / "model.toml"
-    return comparison.following(closed.diagnosis, last.sentence, str(model) if closed.after else "", last.theta)
+    return comparison.next_step(closed.diagnosis, last.sentence, str(model) if closed.after else "", last.theta)

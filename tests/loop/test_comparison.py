@@ -3,7 +3,7 @@
 import pytest
 from tiny_loop import DIAGNOSIS
 
-from proxytune.loop.comparison import Compared, Level, answer, compare_errors, floor_text, following, level_text
+from proxytune.loop.comparison import Compared, Level, answer, compare_errors, floor_text, level_text, next_step
 
 CAMERA = {
     "verdict": "explained",
@@ -62,13 +62,13 @@ def test_motion_and_camera_are_told_together_and_what_has_no_name_or_was_not_mea
 
 
 def test_what_is_next_follows_from_what_was_found():
-    told = following(DIAGNOSIS, STUDIED, "loop/model.toml", {"trim": 0.01, "blur": 0.05})
+    told = next_step(DIAGNOSIS, STUDIED, "loop/model.toml", {"trim": 0.01, "blur": 0.05})
     assert "Run your simulator with loop/model.toml" in told
     assert "from scores alone: blur 0.05" in told
     assert "trim" not in told
     drive = {"name": "spins", "description": "turns on the spot"}
-    told = following({**DIAGNOSIS, "verdict": "partly explained", "next_manoeuvre": drive}, STUDIED, "model.toml", {})
+    told = next_step({**DIAGNOSIS, "verdict": "partly explained", "next_manoeuvre": drive}, STUDIED, "model.toml", {})
     assert told == "Log spins (turns on the spot), and close the loop with that log."
-    assert following(DIAGNOSIS, STUDIED, "", {}) == "Raise budget from 20 to 40, to get closer."
+    assert next_step(DIAGNOSIS, STUDIED, "", {}) == "Raise budget from 20 to 40, to get closer."
     misfit = "No θ fits. Next: log drives and run `python -m proxytune diagnose LOG`."
-    assert "log drives that can show saturation" in following(DIAGNOSIS, misfit, "", {})
+    assert "log drives that can show saturation" in next_step(DIAGNOSIS, misfit, "", {})

@@ -146,15 +146,12 @@ def _angle_contradiction(unit: Unit, values: Floats) -> str:
 
 @dataclass(frozen=True)
 class Column:
-    """A column by the package's name of it (`field`) and the table's, and its unit.
+    """A column of a table, and what it is taken for."""
 
-    That is known as it is "stated", "by its name", "by its size", or "assumed".
-    """
-
-    field: str
-    name: str
+    field: str  # the package's name of it
+    name: str  # the table's
     unit: Unit
-    known_by: str
+    known_by: str  # how the unit is known: "stated", "by its name", "by its size" or "assumed"
 
     def __str__(self) -> str:
         if self.unit.quantity == "number":

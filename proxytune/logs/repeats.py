@@ -27,15 +27,12 @@ USUAL = 0.05
 
 
 class Runs(NamedTuple):
-    """The poses of a drive without their repeats: how many rows show each (N,), and speeds between (N − 1,) [m/s].
+    """The poses of a drive without their repeats, N of them."""
 
-    Turns count as ways. Of the rows with a pose (rows,), those are fresh that have another than the one before.
-    """
-
-    known: Whole
-    fresh: Flags
-    counts: Whole
-    speeds: Floats
+    known: Whole  # the rows that have a pose (K,)
+    fresh: Flags  # whether that pose is another than the one before (K,)
+    counts: Whole  # how many rows show each pose (N,)
+    speeds: Floats  # from each pose to the next, turns counted as ways (N − 1,) [m/s]
 
 
 def runs_of(episode: LogEpisode) -> Runs:

@@ -116,7 +116,8 @@ def read_rows(
 ) -> Rows:
     """Read a table with these columns besides `episode` and `time`, and so many rows an episode at the fewest.
 
-    Some are there all or none, may be left out, or may have empty cells; `why` is what needs them, for a complaint.
+    Columns that belong `together` are there all or none, those that are `optional` may be left out, and cells of those
+    that `may_lack` some may be empty. For a complaint, `why` says what needs the columns.
     """
     header, blocks = read_cells(path)
     _check_header(path, header, ("episode", "time", *needed), why, together, optional)

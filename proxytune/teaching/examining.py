@@ -75,9 +75,9 @@ class _Loss:
     traced: TracedTask
 
     def __call__(self, point: CurvePoint, end: WorkerExit, first: bool = True) -> Any:
-        """Make it once more where that tells which episode it is or it took too long, or say of what it ended.
+        """Make the point once more if it took too long or drove several episodes at once; else say what ended it.
 
-        Where it is lost again it is made once more by the name of one examination, if it was several at once.
+        Of several episodes it is not known which one ended the process; made again, they are driven one by one.
         """
         if self.traced.last(point).endswith(TOGETHER) or (first and end.how == OVERRUN):
             again = functools.partial(self, first=False) if first else self._refuse

@@ -185,11 +185,10 @@ def teach_families(
         alone = examine_curves(setup, {learning.NONE: None}, settings.jobs, watcher)
     scores, failed = dict(alone), dict[str, LearnerError]()
     for name, room in rooms.items():
-        there = replace(setup, proxy=room)
         try:
             with watching(count_examinations(setup.settings, 1)) as watcher:
                 proxy = learning.Distribution({one: (value, value) for one, value in sorted(thetas[name].items())})
-                scores |= examine_curves(there, {name: proxy}, settings.jobs, watcher, alone)
+                scores |= examine_curves(replace(setup, proxy=room), {name: proxy}, settings.jobs, watcher, alone)
         except LearnerError as problem:
             failed[name] = problem
     if len(failed) == len(rooms):

@@ -36,8 +36,7 @@ class DrivenEpisode:
 
     def _repr_html_(self) -> str:
         scores = ", ".join(f"{name} {value:.4g}" for name, value in self.scores.items())
-        table = pd.DataFrame([self.scores]) if self.poses is None else self.poses
-        return frame_html(f"One episode: {scores}.", table)
+        return frame_html(f"One episode: {scores}.", pd.DataFrame([self.scores]) if self.poses is None else self.poses)
 
 
 def drive(

@@ -115,13 +115,9 @@ def export(
         report.write_text(file, patched.text)
         facts = told | {"into": str(given), "has": sorted(patched.has), "diff": patched.diff}
         return ExportReport(file, given.suffix[1:], report.export_lines(instance, report.FILTER, patched.has), facts)
-    if to == report.FILTER:
-        there = _names_of(has, instance.robot.catalogue, "--has ")
-        text, lines = report.node_text(instance, there), report.export_lines(instance, report.FILTER, there)
-    else:
-        text, lines = WRITERS[to](instance), report.export_lines(instance, to)
-    report.write_text(file, text)
-    return ExportReport(file, to, lines, told)
+    there = _names_of(has, instance.robot.catalogue, "--has ") if to == report.FILTER else ()
+    report.write_text(file, report.node_text(instance, there) if to == report.FILTER else WRITERS[to](instance))
+    return ExportReport(file, to, report.export_lines(instance, to, there), told)
 
 
 def robot_files(name: str, folder: Path | None) -> tuple[Path, ...]:

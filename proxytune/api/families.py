@@ -91,7 +91,7 @@ def run_families(path: str | Path, *, progress: bool = False, jobs: int | None =
         InputError: If anything in the study cannot be used, or it is of one family.
         RunError: If no trial of a family works, or the machine fails; all that was finished is kept.
     """
-    settings = _several(study.read_study_settings(Path(path)))
+    settings = _read_several(path)
 
     def tuning(opened: study.Study) -> AbstractContextManager[Watcher]:
         return watching(progress, most_episodes(opened.settings))
@@ -109,7 +109,7 @@ def read_families(path: str | Path) -> FamiliesReport:
         InputError: If one of them has not been run, or was changed since.
         RunError: If no trial of one has a score yet.
     """
-    settings = _several(study.read_study_settings(Path(path)))
+    settings = _read_several(path)
     families = tuple(_tuned(read_study(one.home)) for one in settings.families.values())
     thetas = {one.name: dict(one.theta) for one in families}
     lessons = study.read_lessons(settings) if settings.teaching else {}
@@ -150,7 +150,8 @@ def run_opened_families(
     return FamiliesReport(study.ComparedFamilies(settings, families, lessons), spent)
 
 
-def _several(settings: study.StudySettings) -> study.StudySettings:
+def _read_several(path: str | Path) -> study.StudySettings:
+    settings = study.read_study_settings(Path(path))
     if not settings.families:
         raise settings.error("families", "is missing; name two at least, as in [families.planar], or use run_study")
     return settings

@@ -45,8 +45,8 @@ class SearchBox:
         Raises:
             InputError: If the box is empty or inside out, or the engine cannot be used.
         """
-        for name, number, lowest in (("initial", initial, 1), ("seed", seed, 0)):
-            check_whole(name, number, lowest)
+        check_whole("initial", initial, 1)
+        check_whole("seed", seed)
         self._space = box_space(box)
         self._proposer, self._seed, self._sign = make_proposer(engine, initial), seed, -1.0 if maximise else 1.0
         self._asked: list[Values] = []

@@ -173,7 +173,7 @@ def run_quietly(
 def run_opened(
     opened: study.Study,
     bars: AbstractContextManager[Watcher],
-    warn: Callable[[str], None] = lambda line: None,
+    warn: Callable[[str], None],
     retry_failed: bool = False,
     known: Sequence[Outcome | Theta] = (),
 ) -> StudyReport:

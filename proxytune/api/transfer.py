@@ -295,18 +295,7 @@ def predict(
     named = replace(known, robot=known.robot or fitted.robot, figures=known.figures or stated)
     with open_log(log, wanted or Wanted(), named) as (drives, _):
         if frames is not None:
-            folder = Path(frames)
-            check_no_more_pictures(folder, len(diagnosis.frames_of(drives).paths))
-            numbers, errors = list[int](), list[float]()
-            for part in diagnosis.predict_pictures(drives, _robot_of(fitted, drives, catalogue), fitted.theta):
-                for number, picture in zip(part.numbers.tolist(), part.pictures, strict=True):
-                    write_picture(folder / (diagnosis.PICTURES % number), picture)
-                numbers += part.numbers.tolist()
-                errors += part.grey_errors.tolist()
-                tell(f"drawing: {len(numbers)} frames")
-            # It comes last, so that a list never names what is not there.
-            write_text(folder / "frames.csv", diagnosis.frames_text(drives, diagnosis.frames_of(drives), numbers))
-            return PicturePrediction(folder, len(numbers), float(np.mean(errors)))
+            return _predict_pictures(fitted, drives, catalogue, Path(frames), tell)
         if drives.command == "none":
             hint = "" if drives.frames is None else ", or give --frames to predict those"
             raise InputError(f"{drives.name}: has no commands to predict poses from; give a log of drives{hint}")
@@ -321,6 +310,23 @@ def predict(
         table = diagnosis.predict(drives, robot, fitted.theta, horizon_s)
         notes = tuple(clocks_notes(drives.name, [clocks], {}))
         return Prediction(table, horizon_s, diagnosis.agreement(table, drives, horizon_s), clocks, notes, cautions)
+
+
+def _predict_pictures(
+    model: Model, log: Log, catalogue: Catalogue, folder: Path, tell: Callable[[str], None]
+) -> PicturePrediction:
+    frames = diagnosis.frames_of(log)
+    check_no_more_pictures(folder, len(frames.paths))
+    numbers, errors = list[int](), list[float]()
+    for part in diagnosis.predict_pictures(log, _robot_of(model, log, catalogue), model.theta):
+        for number, picture in zip(part.numbers.tolist(), part.pictures, strict=True):
+            write_picture(folder / (diagnosis.PICTURES % number), picture)
+        numbers += part.numbers.tolist()
+        errors += part.grey_errors.tolist()
+        tell(f"drawing: {len(numbers)} frames")
+    # It comes last, so that a list never names what is not there.
+    write_text(folder / "frames.csv", diagnosis.frames_text(log, frames, numbers))
+    return PicturePrediction(folder, len(numbers), float(np.mean(errors)))
 
 
 def _robot_of(model: Model, log: Log, catalogue: Catalogue) -> Robot:

@@ -22,7 +22,7 @@ from proxytune.errors import EpisodeError, InputError
 from proxytune.files import temporary_folder
 from proxytune.identity import digest, meaning_of_code
 from proxytune.report import write_text
-from proxytune.scores import Metric, read_scores
+from proxytune.scores import Metric, ScoreTable, read_scores
 from proxytune.settings import nearest
 from proxytune.space import Parameter, Theta
 from proxytune.study import FILE_NAME, GIVEN, Study, open_settings, plan_episodes, read_study_settings
@@ -113,13 +113,8 @@ def tune(
             raise InputError(f"simulator: {simulate!r} is no function; an environment needs agents={{name: policy}}")
         counted = int(table.counts.max()) if "start" in _arguments(simulate) else 1
         if repeated := starts is None and counted < table.counts.max():
-            rows = pd.DataFrame(
-                {"agent": agent, "episode": f"0/{place}", **dict(zip(table.metrics, values[place], strict=True))}
-                for agent, values in zip(table.agents, table.values, strict=True)
-                for place in np.flatnonzero(~np.isnan(values[:, 0]))
-            )
-            write_text(home / "target.csv", rows.to_csv(index=False, lineterminator="\n"))
             target = home / "target.csv"
+            write_text(target, _as_repeats(table).to_csv(index=False, lineterminator="\n"))
         stated = {
             "format": 1,
             "name": "tune" if folder is None else home.name,
@@ -144,6 +139,15 @@ def tune(
         units = {one.name: "" for one in settings.metrics}
         study = open_settings(settings, GivenFamily(simulate, own, units, names, settings.starts, identity))
         return run_quietly(study, progress, _known(study, known))
+
+
+def _as_repeats(table: ScoreTable) -> pd.DataFrame:
+    """All of the target's episodes as repeats of start 0."""
+    return pd.DataFrame(
+        {"agent": agent, "episode": f"0/{place}", **dict(zip(table.metrics, values[place], strict=True))}
+        for agent, values in zip(table.agents, table.values, strict=True)
+        for place in np.flatnonzero(~np.isnan(values[:, 0]))
+    )
 
 
 @contextmanager

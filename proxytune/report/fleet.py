@@ -29,7 +29,7 @@ def fleet_sentence(fleet: Fleet) -> str:
     if fleet.population is None:
         return f"Of {len(fleet.robots)} robots {len(fleet.fitting)} can be explained: too few for p(θ).{out}"
     differ = [
-        f"{plain(name)} by {_told(spread)} {fleet.units[name]}".rstrip()
+        f"{plain(name)} by {_with_interval(spread)} {fleet.units[name]}".rstrip()
         for name, spread in fleet.deviation.items()
         if fleet.varies[name]
     ]
@@ -50,7 +50,7 @@ def fleet_notes(fleet: Fleet) -> tuple[str, ...]:
         if 2 * sum(name in one.knowledge.unidentified for one in fleet.fitting) > count:
             notes.append(f"{plain(name)}: unidentified by most robots, so p(θ) of it is what was assumed")
     for pair, found in fleet.correlations.items():
-        notes.append(f"{listed([*map(plain, pair)])} go together between robots: correlation {_told(found)}")
+        notes.append(f"{listed([*map(plain, pair)])} go together between robots: correlation {_with_interval(found)}")
     return tuple(dict.fromkeys(notes))
 
 
@@ -74,12 +74,12 @@ def fleet_tables(fleet: Fleet) -> tuple[Table, ...]:
         return (by_robot,)
     rows = []
     for name, told in fleet.next_robot.items():
-        known = _told(fleet.mean[name]), _told(fleet.deviation[name]), span((told.low, told.high))
+        known = _with_interval(fleet.mean[name]), _with_interval(fleet.deviation[name]), span((told.low, told.high))
         rows.append((heads[name], *known, "yes" if fleet.varies[name] else "not told"))
     columns = ("mean", "standard deviation", "95 % of robots", "robots differ")
     title = f"p(θ) over {len(fleet.fitting)} robots"
     population = Table(title, columns_of(("parameter",), columns), tuple(rows), (ABOUT["fleet"],))
-    given = tuple((name, *map(_told, theta.values())) for name, theta in fleet.given.items())
+    given = tuple((name, *map(_with_interval, theta.values())) for name, theta in fleet.given.items())
     return population, by_robot, Table(GIVEN, columns_of(("robot",), [*heads.values()]), given)
 
 
@@ -107,7 +107,7 @@ def fleet_text(fleet: Fleet, files: Mapping[str, Any]) -> Group:
     return group_texts(fleet_sentence(fleet), *tables, *paste, *file_texts(files))
 
 
-def _told(found: Estimate) -> str:
+def _with_interval(found: Estimate) -> str:
     ends = (found.low, found.high)
     return f"{as_known(found.value, ends)} ({span(ends)})"
 

@@ -100,17 +100,15 @@ def _said(found: LogDiagnosis) -> list[tuple[str, list[Table], list[str]]]:
 
 
 def _with_remarks(found: LogDiagnosis, said: Sequence[Said]) -> list[Said | str]:
-    """What is said, after cautions, a line each, and before why a part is missing, likewise."""
+    """Cautions, a line each, then what is said, then why a part is missing."""
     refused = {"motion": found.motion_refused, "camera": found.camera_refused}
     missing = [f"{part}: {why}" for part, why in refused.items() if why]
     return [*(f"beware: {line}" for line in found.cautions), *said, *missing]
 
 
 def diagnosis_pictures(figures: Mapping[str, Drawn]) -> list[Picture]:
-    """The figures that there are, with captions; one without a caption comes last under its own name."""
-    captions = CAPTIONS["diagnosis"]
-    known = [picture_of("diagnosis", name, figures[name]) for name in captions if name in figures]
-    return [*known, *(Picture(name, image, "") for name, image in figures.items() if name not in captions)]
+    """The figures that there are, with captions."""
+    return [picture_of("diagnosis", name, figures[name]) for name in CAPTIONS["diagnosis"] if name in figures]
 
 
 def _motion_tables(diagnosis: Diagnosis) -> list[Table]:

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 
 from proxytune.diagnosis import Blemish, CameraDiagnosis, CameraEffect, Estimate, LaidLine, LaidMap
-from proxytune.report.diagnosis.notes import meaning_of, told
+from proxytune.report.diagnosis.notes import say_verdict
 from proxytune.report.wording import fixed, listed, short
 
 MOST_LINES = 3
@@ -18,8 +18,7 @@ RELATIVE = (
 
 def camera_headline(log: str, diagnosis: CameraDiagnosis, found: str = "", beside: str = "") -> str:
     """What was found and fitted of the camera, then the verdict and what it means."""
-    meaning = meaning_of(diagnosis.verdict, "camera", diagnosis.at_ends)
-    return f"{log}: camera: {told(found, beside, diagnosis.verdict)}: {meaning}"
+    return f"{log}: camera: {say_verdict(found, beside, diagnosis.verdict, 'camera', diagnosis.at_ends)}"
 
 
 def camera_notes(diagnosis: CameraDiagnosis) -> list[str]:

@@ -29,12 +29,18 @@ AMPLE = 30.0
 
 def motion_headline(diagnosis: Diagnosis, found: str = "", beside: str = "") -> str:
     """What was found and fitted, in the words of `meanings`, then the verdict and what it means."""
-    meaning = meaning_of(diagnosis.verdict, "motion", diagnosis.edges)
+    said = say_verdict(found, beside, diagnosis.verdict, "motion", diagnosis.edges)
     sure = f" (expected false names: at most {diagnosis.expected_false_names:.2f})" if diagnosis.effects else ""
-    return f"{diagnosis.log}: {told(found, beside, diagnosis.verdict)}: {meaning}{sure}"
+    return f"{diagnosis.log}: {said}{sure}"
 
 
-def meaning_of(verdict: str, part: str, at_ends: Sequence[str]) -> str:
+def say_verdict(found: str, beside: str, verdict: str, part: str, at_ends: Sequence[str]) -> str:
+    """A verdict and what it means, after what was found, if anything was, and beside it what was fitted."""
+    head = f"{found}{beside}. {verdict.capitalize()}" if found else f"{verdict}{beside}"
+    return f"{head}: {_meaning_of(verdict, part, at_ends)}"
+
+
+def _meaning_of(verdict: str, part: str, at_ends: Sequence[str]) -> str:
     """What a verdict on motion or the camera means; values at the end of all that is possible explain nothing."""
     meaning = VERDICTS[verdict][part]
     if not at_ends:
@@ -42,11 +48,6 @@ def meaning_of(verdict: str, part: str, at_ends: Sequence[str]) -> str:
     rest = "" if verdict == "partly explained" else f"; {meaning}"
     stand = f"{listed(at_ends)} at the end of the range {'stands' if len(at_ends) == 1 else 'stand'}"
     return f"{stand} for something else, which no named effect explains{rest}"
-
-
-def told(found: str, beside: str, verdict: str) -> str:
-    """A verdict after what was found, as a sentence of its own where anything was; what was fitted stands beside."""
-    return f"{found}{beside}. {verdict.capitalize()}" if found else f"{verdict}{beside}"
 
 
 def motion_notes(diagnosis: Diagnosis) -> list[str]:

@@ -165,10 +165,8 @@ def name_lines(axes: Axes, names: Sequence[LineName], apart: float = ONE_LINE) -
 
 def spread_places(places: Sequence[float], apart: float) -> list[float]:
     """Places moved as little as it takes to be so far apart, in the same order, from 0 to 1 where they fit there."""
-    order = sorted(range(len(places)), key=lambda row: places[row])
-    moved = np.array([places[row] for row in order])
-    steps = apart * np.arange(len(moved))
+    order, steps, moved = np.argsort(places, kind="stable"), apart * np.arange(len(places)), np.empty(len(places))
     # Least squares with the order kept: places that would touch share the mean of theirs.
-    most = max(0.0, 1.0 - apart * (len(moved) - 1))
-    found = np.clip(isotonic_regression(moved - steps).x, 0.0, most) + steps
-    return [float(found[order.index(row)]) for row in range(len(places))]
+    most = max(0.0, 1.0 - apart * (len(places) - 1))
+    moved[order] = np.clip(isotonic_regression(np.asarray(places)[order] - steps).x, 0.0, most) + steps
+    return moved.tolist()

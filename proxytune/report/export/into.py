@@ -26,28 +26,22 @@ XACRO = "is a program that makes a URDF: run `xacro {0} > {1}`, patch {1}, and c
 
 @dataclass(frozen=True)
 class Wheel:
-    """A driven wheel in a file, by its joint: its centre in the frame that wheels and camera share (3,) [m].
-
-    It is moved by so much in that frame (3,) [m], or its radius multiplied, which is None of a mesh.
-    """
+    """A driven wheel in a file."""
 
     joint: str
-    centre: Floats
-    radius_m: float | None
-    move: Callable[[Floats], None]
-    grow: Callable[[float], None]
+    centre: Floats  # in the frame that wheels and camera share (3,) [m]
+    radius_m: float | None  # None of a mesh
+    move: Callable[[Floats], None]  # moves it by so much in that frame (3,) [m]
+    grow: Callable[[float], None]  # multiplies its radius
 
 
 @dataclass(frozen=True)
 class OwnFile:
-    """What a file of another simulator has that may be changed: the left and right wheel, and its only camera.
+    """What a file of another simulator has that may be changed."""
 
-    That is given a pose (4, 4) in the frame of the wheels, and a vertical field of view [deg] where it has one.
-    """
-
-    wheels: tuple[Wheel, Wheel]
-    aim: Callable[[Floats], None] | None
-    widen: Callable[[float], None] | None = None
+    wheels: tuple[Wheel, Wheel]  # left and right
+    aim: Callable[[Floats], None] | None  # gives its only camera a pose (4, 4) in the frame of the wheels
+    widen: Callable[[float], None] | None = None  # gives that a vertical field of view [deg]; None where it has none
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ from xml.sax.saxutils import escape, quoteattr
 from proxytune.errors import InputError
 from proxytune.settings import SETTINGS_MB, check_end
 
+ATTRIBUTE = rb"""\s+%b\s*=\s*("[^"]*"|'[^']*')"""
 OPENING = re.compile(rb"""<[^'">]*(?:(?:"[^"]*"|'[^']*')[^'">]*)*>""")
 
 
@@ -60,8 +61,7 @@ class XmlPatch:
         """Give an attribute a value; it is added where the element has none of that name."""
         begin, opened, _ = self._places[element]
         tag = self._bytes[begin:opened]
-        found = re.search(rb"\s" + re.escape(name).encode() + rb"""\s*=\s*("[^"]*"|'[^']*')""", tag)
-        if found:
+        if found := re.search(ATTRIBUTE % re.escape(name).encode(), tag):
             self._changes.append((begin + found.start(1), begin + found.end(1), quoteattr(value)))
         else:
             last = begin + len(re.sub(rb"\s*/?>$", b"", tag))
@@ -70,8 +70,7 @@ class XmlPatch:
     def unset(self, element: ET.Element, name: str) -> None:
         """Take an attribute away."""
         begin, opened, _ = self._places[element]
-        pattern = rb"\s+" + re.escape(name).encode() + rb"""\s*=\s*("[^"]*"|'[^']*')"""
-        if found := re.search(pattern, self._bytes[begin:opened]):
+        if found := re.search(ATTRIBUTE % re.escape(name).encode(), self._bytes[begin:opened]):
             self._changes.append((begin + found.start(), begin + found.end(), ""))
 
     def set_text(self, element: ET.Element, text: str) -> None:

@@ -108,7 +108,6 @@ from .teaching import (
     teach_view as teach_view,
 )
 from .text import (
-    WholeWords as WholeWords,
     check_table_file as check_table_file,
     group_texts as group_texts,
     note_texts as note_texts,

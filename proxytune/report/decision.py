@@ -77,14 +77,14 @@ def decision_table(assessment: Assessment, target: str) -> Table:
     decision, saving, plan = assessment.decision, assessment.saves, assessment.next
     rows = []
     for agent in sorted(decision.expected_regret, key=lambda one: decision.expected_regret[one]):
-        mean, ends = decision.scores[agent] if decision.scores else (None, None)
-        span = decision.regret_interval[agent] if decision.regret_interval else None
+        scored = decision.scores[agent] if decision.scores else None
+        span = decision.regret_interval[agent] if decision.regret_interval else (None, None)
         chance = decision.best_probabilities[agent] if decision.best_probabilities else None
         rows.append((
             agent,
-            "–" if mean is None or ends is None else with_span(mean, *ends),
+            with_span(scored[0], *scored[1]) if scored else "–",
             "–" if chance is None else "> 0.99" if 0.995 <= chance < 1.0 else f"{chance:.2g}",
-            with_span(short(decision.expected_regret[agent], 2), *(span or (None, None))),
+            with_span(short(decision.expected_regret[agent], 2), *span),
             str(plan.rollouts.get(agent, "")),
         ))  # fmt: skip
     heads = (f"{decision.chosen_on} on the target", "best with", "expected regret", "more rollouts")

@@ -59,7 +59,7 @@ def families_answer(compared: ComparedFamilies) -> str:
 def families_next_step(compared: ComparedFamilies) -> str:
     """The step that brings most."""
     choice, fresh = compared.predicts, {one.name: one.fresh for one in compared.families}
-    if (best := fresh.get(choice.best or "")) is None:
+    if choice.best is None or (best := fresh.get(choice.best)) is None:
         return "run the study again, to drive every family's best θ afresh."
     if best.chance.explains:
         return f"raise stop.wall_time_s (now {compared.settings.stop.wall_time_s:g}), or add agents that differ more."
@@ -68,7 +68,7 @@ def families_next_step(compared: ComparedFamilies) -> str:
         home = next(one.result.study.settings.home for one in compared.families if one.name == choice.best)
         return f"use {choice.best} to predict; its page: {home / 'report.html'}."
     # Of those that predict alike, one whose episodes are shown to take the shortest
-    names = [choice.best or "", *choice.alike]
+    names = [choice.best, *choice.alike]
     means = {name: one[0] for name, one in compared.seconds_per_episode().items() if name in names}
     cheap = min(means, key=means.__getitem__)
     others = [one for name, one in compared.times_cheapest(cheap).items() if name in names and name != cheap]
@@ -307,8 +307,7 @@ def families_figure(compared: ComparedFamilies) -> Figure:
     plv: dict[str, Spread] = {name: (one.value or 0.0, one.low, one.high) for name, one in known.items()}
     panels = [Panel("fresh PRPV\n[ordered pairs]", prpv, compared.predicts)]
     panels += [Panel("PLV\n[samples saved]", plv, compared.teaches)] if compared.lessons else []
-    seconds = dict(compared.seconds_per_episode())
-    panels.append(Panel("time per\nepisode [s]", seconds, compared.cheapest, ratios=True))
+    panels.append(Panel("time per\nepisode [s]", dict(compared.seconds_per_episode()), compared.cheapest, ratios=True))
     short_names = [name if len(name) <= LONGEST else f"{name[: LONGEST - 1]}…" for name in names]
     figure, (drawn,) = style.grid_of(1.0 + 0.24 * len(names), 1, len(panels), sharey=True)
     for axes, panel in zip(drawn, panels, strict=True):

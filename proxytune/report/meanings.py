@@ -49,8 +49,7 @@ def finding(effect: Mapping[str, Any], catalogue: Catalogue = SHIPPED) -> str:
         own = {}
     sized = {key: one for key, one in known.items() if one["value"] is not None}
     # What a form of the effect holds at 0 says nothing.
-    told = {key: one for key, one in sized.items() if one["value"] != 0.0 or len(set(one["interval"])) > 1}
-    sizes = {key: _size(one) for key, one in told.items()}
+    sizes = {key: _size(one) for key, one in sized.items() if one["value"] != 0.0 or len(set(one["interval"])) > 1}
     said = [clause_of(own.get(key, key), size) or f"{plain(key)} {size}" for key, size in sizes.items()]
     return f"{plain(name)}: {'; '.join([listed(said), *_worth(effect)])}" if said else plain(name)
 

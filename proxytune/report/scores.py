@@ -177,8 +177,7 @@ def _rates(rates: SuccessRates) -> Table:
         proxy = rates.proxy[agent]
         rows.append((agent, str(proxy), str(proxy.episodes), str(target), str(target.episodes)))
     title = f"{rates.metric}: success rates with their own 95 % intervals (Wilson)"
-    heads = ("in the proxy", "episodes", "on the target", "episodes")
-    return Table(title, columns_of(("agent",), heads), tuple(rows))
+    return Table(title, columns_of(("agent",), ("in the proxy", "episodes", "on the target", "episodes")), tuple(rows))
 
 
 def _ranking(assessments: Assessments, selection: Selection, target: str, notes: tuple[str, ...]) -> Table:

@@ -40,7 +40,7 @@ def curve_name(curve: SweepCurve) -> str:
 
     The mark is left out where the others are nominal; the curve's JSON has what is held.
     """
-    mark = [held_mark(curve.base)] if held_texts(curve) else []
+    mark = [held_mark(curve.base)] if held_texts(curve.base, curve.parameter) else []
     return "_".join(["sweep", curve.parameter, *mark, *(["pod"] if curve.has_pod else [])])
 
 
@@ -49,9 +49,9 @@ def held_mark(base: Theta) -> str:
     return digest(json.dumps(sorted((name, float(value)) for name, value in base.items())), length=6)
 
 
-def held_texts(curve: SweepCurve) -> list[str]:
-    """Values that the curve's other parameters are held at, as texts; those nominal are not named."""
-    return [f"{name}={value:g}" for name, value in sorted(curve.base.items()) if name != curve.parameter]
+def held_texts(base: Theta, swept: str) -> list[str]:
+    """Values that parameters are held at but for the one that is swept, as texts; those nominal are not named."""
+    return [f"{name}={value:g}" for name, value in sorted(base.items()) if name != swept]
 
 
 def curve_document(curve: SweepCurve) -> dict[str, Any]:
@@ -92,7 +92,7 @@ def sweep_text(curves: Sequence[SweepCurve], episodes: int, files: Sequence[Path
     """Curves as `sweep` prints them: the paper's measures, the others, what each shows; episodes run, files written."""
     parts: list[RenderableType] = []
     for curve in curves:
-        title = " ".join([curve.parameter, *held_texts(curve)])
+        title = " ".join([curve.parameter, *held_texts(curve.base, curve.parameter)])
         first, second = curve_tables(curve)
         parts += [table_text(replace(first, title=title)), table_text(replace(second, title=""))]
         parts.append("\n".join(["", *first.notes, ""]))
@@ -253,7 +253,7 @@ def held_alike(curves: Sequence[SweepCurve]) -> list[list[SweepCurve]]:
 def held_values(curves: Sequence[SweepCurve], whose: str = "") -> str:
     """Say what the others are held at, and whose values these are; of one curve its own value is none of these."""
     own = curves[0].parameter if len(curves) == 1 else ""
-    values = ", ".join(f"{name}={value:g}" for name, value in sorted(curves[0].base.items()) if name != own)
+    values = ", ".join(held_texts(curves[0].base, own))
     return f"the others are held at {whose}{values}" if values else "the others are nominal"
 
 

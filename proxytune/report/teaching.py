@@ -118,8 +118,7 @@ def teach_table(experiment: teaching.Experiment, prpv: Predictivities) -> Table:
         if factor is not None and factor.value is not None:
             text = _with_ends(replace(factor, low=factor.low or 0.0), "", "{:.2g}".format)
             notes.append(f"{lesson.name}: samples needed without the proxy / with it = {text}")
-    title = "PLV of each proxy (the paper's table 1)"
-    return Table(title, columns_of(("proxy",), heads), tuple(rows), tuple(notes))
+    return Table("PLV of each proxy (the paper's table 1)", columns_of(("proxy",), heads), tuple(rows), tuple(notes))
 
 
 def _row(lesson: teaching.TeacherResult, prpv: teaching.Predictivity | None) -> tuple[str, ...]:

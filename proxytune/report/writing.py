@@ -81,7 +81,7 @@ def svg_of(figure: Figure) -> bytes:
 
 
 def _marks(figure: Figure) -> Iterator[tuple[str, list[str]]]:
-    """Whatever is drawn by markers gets a name, with which goes what each of its markers says."""
+    """Name whatever is drawn by markers; each name with the titles of its markers."""
     for axes in figure.axes:
         drawn: list[Any] = [line for line in axes.lines if line.get_transform() is axes.transData]
         for artist in (*drawn, *(one for one in axes.collections if isinstance(one, PathCollection))):
@@ -104,11 +104,10 @@ def _place(axis: Axis, value: float) -> str:
 def _titled(group: str, said: Mapping[str, list[str]]) -> str:
     """A group of an SVG with titles for its markers; without a name that differs from one time to the next."""
     name = group[len('<g id="') :].partition('"')[0]
-    uses = re.findall(r"<use [^>]*/>", group)
     if name not in said:
         return group
     parts = iter(said[name])
-    if len(uses) == len(said[name]):
+    if len(re.findall(r"<use [^>]*/>", group)) == len(said[name]):
         group = re.sub(r"(<use [^>]*)/>", lambda it: f"{it[1]}><title>{html.escape(next(parts))}</title></use>", group)
     return group.replace(f' id="{name}"', "", 1)
 

@@ -95,8 +95,7 @@ class _View:
         self._path.set_data(*places.T)
         self._robot.set_data(*places[-1:].T)
         self._robot.set_marker((3, 0, np.degrees(_heading(episode, row)) - 90.0))
-        over = time >= episode.seconds
-        self._clock.set_text(f"ended at {episode.seconds:.1f} s" if over else f"{time:.1f} s")
+        self._clock.set_text(f"ended at {episode.seconds:.1f} s" if time >= episode.seconds else f"{time:.1f} s")
         for artist in (self._path, self._robot, self._clock):
             _redraw(artist)
         if not episode.channels:

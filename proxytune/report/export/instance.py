@@ -31,8 +31,7 @@ class Instance:
     @property
     def effects(self) -> Mapping[str, Effect]:
         """The effects by name."""
-        chosen = effects_from(self.theta, self.robot.figures, self.robot.catalogue)
-        return {effect.name: effect for effect in chosen}
+        return {effect.name: effect for effect in effects_from(self.theta, self.robot.figures, self.robot.catalogue)}
 
     def value(self, effect: str, parameter: str, otherwise: float) -> float:
         """A parameter of an effect; otherwise where the instance does not have that effect."""

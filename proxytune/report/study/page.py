@@ -40,8 +40,7 @@ def study_text(result: StudyResult, spent: str, files: Mapping[str, Any]) -> Gro
 
 def study_tables(result: StudyResult, spent: str = "") -> dict[str, Table]:
     """Tables by title: what is known of θ, how useful the proxy is there, what informs each parameter, the search."""
-    informed = information_table(result)
-    tables = (theta_table(result), usefulness_table(result), informed, search_table(result, spent))
+    tables = (theta_table(result), usefulness_table(result), information_table(result), search_table(result, spent))
     return {table.title: table for table in tables if table.rows}
 
 
@@ -178,8 +177,7 @@ def search_table(result: StudyResult, spent: str = "") -> Table:
         rows.append(("low fidelity", f"{result.low_fidelity} trials of {names}, corrected by this proxy's"))
     if result.preflight is not None:
         warnings = [line.removeprefix("pre-flight: ") for line in result.preflight.warnings]
-        every = ["every parameter changes some metric beyond noise"]
-        rows += [("pre-flight", line) for line in warnings or every]
+        rows += [("pre-flight", line) for line in warnings or ["every parameter changes some metric beyond noise"]]
     if result.pruned:
         episodes, seconds = result.spared
         trials = f"{len(result.pruned)} trial{'' if len(result.pruned) == 1 else 's'} that could not be the best"
@@ -283,8 +281,7 @@ def write_live_page(
 
     The trials are those that have ended, in order; what is being done is "" once the study was stopped.
     """
-    view = live_view(settings, objective, trials, doing)
-    write_page(path, view, study_foot(settings), RENEW_S if doing else 0)
+    write_page(path, live_view(settings, objective, trials, doing), study_foot(settings), RENEW_S if doing else 0)
 
 
 def live_view(settings: StudySettings, objective: str, trials: Sequence[TrialRecord], doing: str) -> View:

@@ -168,8 +168,7 @@ def known_parameters(result: StudyResult) -> tuple[KnownParameter, ...]:
         name, ends = interval.name, learnt.intervals[interval.name]
         share = (ends[1] - ends[0]) / (interval.high - interval.low)
         best = result.best.trial.theta[name]
-        identified = name not in learnt.unidentified
-        parameters.append(KnownParameter(name, units[name].unit, best, ends, share, identified))
+        parameters.append(KnownParameter(name, units[name].unit, best, ends, share, name not in learnt.unidentified))
     return tuple(parameters)
 
 

@@ -18,6 +18,7 @@ from proxytune.files import check_place, package_table
 from proxytune.importing import finite, open_log
 from proxytune.logs import Log
 from proxytune.report import diagnosis_text
+from proxytune.settings import check_whole
 
 STEPS: dict[str, dict[str, float]] = package_table("cli/steps.toml")
 MOTION_SHARE = 0.8
@@ -41,8 +42,7 @@ def limits_of(arguments: argparse.Namespace) -> Limits:
 
 def run(arguments: argparse.Namespace) -> Answer:
     """Diagnose, and write diagnosis.json, model.toml and the figures."""
-    if arguments.seed < 0:
-        raise InputError(f"--seed must be at least 0, got {arguments.seed}")
+    check_whole("--seed", arguments.seed)
     limits = limits_of(arguments)
     wanted, facts, nothing = wanted_of(arguments), facts_of(arguments), nullcontext((None, ()))
     other = open_log(arguments.test, wanted, facts) if arguments.test else nothing

@@ -13,6 +13,7 @@ from proxytune.domain import DomainFamily, make_episode
 from proxytune.errors import InputError
 from proxytune.report import NO_PLACES, check_episode_file, episode_document, episode_text, say_parting, write_episode
 from proxytune.seeds import episode_seed
+from proxytune.settings import check_whole
 
 
 def run(arguments: argparse.Namespace) -> Answer:
@@ -54,8 +55,8 @@ def run(arguments: argparse.Namespace) -> Answer:
 
 
 def _check(arguments: argparse.Namespace, family: DomainFamily) -> None:
-    if arguments.seed is not None and arguments.seed < 0:
-        raise InputError(f"--seed must be at least 0, got {arguments.seed}")
+    if arguments.seed is not None:
+        check_whole("--seed", arguments.seed)
     if arguments.output:
         check_episode_file(arguments.output)
         if not study.can_record(family):

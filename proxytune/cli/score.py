@@ -41,12 +41,12 @@ def read_sides(
 def _metrics_given(arguments: argparse.Namespace) -> list[str]:
     """The metrics asked for with patterns resolved, or those that one table has of both sides."""
     path, domain = split_source(arguments.target[0])
-    known = arguments.metric or []
-    if known and not any("*" in text or "?" in text for text in known):
-        return list(known)
+    asked = arguments.metric or []
+    if asked and not any("*" in text or "?" in text for text in asked):
+        return list(asked)
     header = scores.column_names(path, domain)
-    if known:
-        return scores.expand(known, header)
+    if asked:
+        return scores.expand(asked, header)
     found = scores.both_metrics(header)
     if not found or not all("success" in name for name in found):
         known = found or [name for name in header if name not in scores.LABELS]

@@ -99,8 +99,7 @@ def search_by_plv(opened: study.Study, folder: Path, by_prpv: Callable[[], study
     predictive = by_prpv() if setup.settings.narrow else None
     space = search_space(settings, widths, predictive.knowledge.as_good[1] if predictive else {})
     terminal = Bars(most_examinations(setup.settings), "points of learning curves")
-    watching = renewed_page(settings, study.LEARNING, terminal)
-    with locked(folder), Store.open(folder) as store, watching as bars:
+    with locked(folder), Store.open(folder) as store, renewed_page(settings, study.LEARNING, terminal) as bars:
         search = PlvSearch(settings, setup, store, space, bars)
         chosen = predictive.best.trial.theta if predictive else None
         result = search.run(make_proposer(opened.engine, settings.initial), chosen)

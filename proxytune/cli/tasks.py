@@ -120,8 +120,8 @@ def take_in(arguments: argparse.Namespace) -> Answer:
         found = api.import_log(arguments.source, arguments.output, wanted=wanted, facts=facts)
     source, output = found.source, arguments.output
     rows = tuple((one.name, one.kind, str(one.count), one.role) for one in source.channels)
-    columns = (report.Column("what"), report.Column("type"), *report.columns_of((), ("count",)))
-    channels = report.Table(source.form, (*columns, report.Column("taken for")), rows)
+    columns = (*report.columns_of(("what", "type"), ("count",)), report.Column("taken for"))
+    channels = report.Table(source.form, columns, rows)
     heads = report.columns_of(
         ("drive",), ("time", "poses", "rate", "jitter", "lost", "gaps", "commands", "answers after")
     )

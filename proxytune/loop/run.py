@@ -163,7 +163,8 @@ class _Closing:
             ]
         episodes = sum(count for _, count in driven)
         self.episodes += episodes
-        self.done += [name] if episodes else []
+        if episodes:
+            self.done.append(name)
         return driven[0][0], driven[1][0]
 
     def _held_out_target(self, names: tuple[str, ...]) -> Path | None:

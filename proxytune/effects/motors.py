@@ -193,8 +193,8 @@ class ReversalPause(ShippedEffect):
         rested = np.maximum(np.where(turned, rest, -np.inf), -memory.rested[..., None])
         rested = np.maximum.accumulate(rested, axis=-1)
         share = np.clip(starts + 1.0 - rested - memory.pause, 0.0, 1.0)
-        ago = (len(starts) - newest[..., -1] for newest in (ended, rested))
-        return np.moveaxis(duty * share, -1, -2), ReversalState(way[..., -1], *ago, memory.pause)
+        ended, rested = (len(starts) - newest[..., -1] for newest in (ended, rested))
+        return np.moveaxis(duty * share, -1, -2), ReversalState(way[..., -1], ended, rested, memory.pause)
 
 
 class SlewState(NamedTuple):

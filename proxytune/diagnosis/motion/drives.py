@@ -120,15 +120,16 @@ def commands_as(kind: str, robot: Robot, duties: Floats) -> Floats:
 class Commands(NamedTuple):
     """An episode's commands (M, 2), as fractions of full speed."""
 
-    times: Floats  # from the first sample on [s]
+    times: Floats  # from the first tick on [s]
     duties: Floats
-    rest: Floats  # what was in force before the first sample
+    rest: Floats  # what was in force before the first tick
     ticks_each: int  # how long each lasts where commands go with the samples, else 0
 
     def over_ticks(self, length: int, tick_hz: float) -> Floats:
         """The mean of the command in force over each tick (length, 2); each is held from its own time."""
         if self.ticks_each:
-            return _hold(self.duties, self.ticks_each, length)
+            lead = round(self.times[0] * tick_hz)
+            return np.concatenate((np.tile(self.rest, (lead, 1)), _hold(self.duties, self.ticks_each, length - lead)))
         ends = np.array((min(0.0, self.times[0]) - 1.0, *self.times, max(length / tick_hz, self.times[-1]) + 1.0))
         held = np.concatenate((self.rest[None], self.duties))
         total = np.concatenate((np.zeros((1, 2)), np.cumsum(held * np.diff(ends)[:, None], axis=0)))
@@ -144,14 +145,29 @@ class Commands(NamedTuple):
         return found
 
 
-def commands_of(log: Log, robot: Robot, episode: LogEpisode, ticks: int) -> Commands:
-    """An episode's commands; `ticks` are a sample's. Refused if it has none, or they ask for more than full speed."""
+LEAD_S = 1.0
+"""Commands are followed from so long before the first pose; what was in force then is taken to have been for ever."""
+
+
+def _lead(episode: LogEpisode, rate_hz: float) -> int:
+    """Samples before the first pose over which commands are followed that were sent then."""
+    if episode.issued is None:
+        return 0
+    ahead = episode.times[0] - episode.issued
+    return math.ceil(float(np.max(ahead, where=ahead <= LEAD_S, initial=0.0)) * rate_hz - 1e-6)
+
+
+def commands_of(log: Log, robot: Robot, episode: LogEpisode, ticks: int, lead_s: float) -> Commands:
+    """An episode's commands; `ticks` are a sample's, and the first is so long before the first sample.
+
+    Refused if it has none, or they ask for more than full speed.
+    """
     duties, rest = duties_of(log, robot, episode.commands), np.zeros(2)
     if episode.wheels is not None and robot.drive == "differential" and np.isfinite(episode.wheels[0]).all():
         rest = np.asarray(episode.wheels[0] * robot.figures["wheel_radius"] / robot.figures["full_speed"])
     if episode.issued is None:
-        return Commands(np.arange(len(duties)) / log.rate_hz, duties, rest, ticks)
-    times = episode.issued - episode.times[0]
+        return Commands(np.arange(len(duties)) / log.rate_hz + lead_s, duties, rest, ticks)
+    times = episode.issued - episode.times[0] + lead_s
     before = np.flatnonzero(times < -1e-9)
     return Commands(times, duties, duties[before[-1]] if len(before) and episode.wheels is None else rest, 0)
 
@@ -221,6 +237,7 @@ class Drives:
     # how long after the ticks `first` and `last` its poses were measured, or before (N, 2) [ticks]; None where
     # poses lie on ticks
     after: Floats | None = None
+    lead: int = 0  # tick at which the first sample was measured: commands before it act on it
     rules: Rules = RULES  # of a diagnosis of them
     # where values of effects are looked for, by name in θ, if not in their usual ranges
     ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
@@ -323,10 +340,15 @@ def gather(log: Log, robot: Robot, episodes: Sequence[LogEpisode], *, compared: 
     # two wheels were got without slack, and stay what they are.
     slack = SLACK if robot.drive == "ackermann" else 0.0
     ticks = math.ceil(TICK_HZ / log.rate_hz - slack)
-    length = max(len(episode.times) for episode in episodes) * ticks
     tick_hz = log.rate_hz * ticks
-    given = [commands_of(log, robot, episode, ticks) for episode in episodes]
+    measured = any(episode.wheels is not None for episode in episodes)  # which tell how fast wheels turn at first
+    early = 0 if measured else max(_lead(episode, log.rate_hz) for episode in episodes)
+    lead, length = early * ticks, (early + max(len(episode.times) for episode in episodes)) * ticks
     samples = rows_of_poses(log, episodes)
+    lead_s = early / log.rate_hz
+    given = [commands_of(log, robot, episode, ticks, lead_s) for episode in episodes]
+    rests = [_at_start(one, lead_s, e, s, robot) for one, e, s in zip(given, episodes, samples, strict=True)]
+    given = [one._replace(rest=rest) for one, rest in zip(given, rests, strict=True)]
     rows = np.concatenate([np.stack((s[:-1], s[1:]), axis=1) for s in samples])
     number = np.repeat(np.arange(len(episodes)), [max(0, len(s) - 1) for s in samples])
     if compared and len(rows) == 0:
@@ -341,17 +363,18 @@ def gather(log: Log, robot: Robot, episodes: Sequence[LogEpisode], *, compared: 
         rate_hz=1.0 / float(np.median(np.concatenate(between))) if between else log.rate_hz,
         duties=np.stack([one.over_ticks(length, tick_hz) for one in given]),
         issued=np.stack([one.ticks(length, tick_hz) for one in given]),
-        rest=np.stack([_at_start(one, e, s, robot) for one, e, s in zip(given, episodes, samples, strict=True)]),
-        headings=np.stack([_ticks_of_heading(e, ticks, length) for e in episodes]),
+        rest=np.stack([one.rest for one in given]),
+        headings=np.stack([_ticks_of_heading(e, ticks, lead, length) for e in episodes]),
         episode=number,
-        first=rows[:, 0] * ticks,
-        last=rows[:, 1] * ticks,
+        first=rows[:, 0] * ticks + lead,
+        last=rows[:, 1] * ticks + lead,
         poses=poses,
         linked=linked,
         block=number,
         travel=_travel(number, poses, rows, log.rate_hz),
         wheels=_wheels(robot, episodes, ticks, length),
         after=after * tick_hz if after.any() else None,
+        lead=lead,
     )
     return drives.only(rows[:, 1] - rows[:, 0] <= GAP_S * log.rate_hz)
 
@@ -362,17 +385,22 @@ IN_MOTION, STEADY = 0.15, 0.75
 """A drive begins in motion if its wheels go faster than this share of full speed, and than this share of later on."""
 
 
-def _at_start(given: Commands, episode: LogEpisode, samples: Whole, robot: Robot) -> Floats:
-    """Duties before the first sample (2,): known ones, or of a drive that begins in motion its speeds as such."""
+def _at_start(given: Commands, lead_s: float, episode: LogEpisode, samples: Whole, robot: Robot) -> Floats:
+    """Duties before the first tick (2,): known ones, or of a drive that begins in motion its speeds as such."""
     times = episode.times[samples] - episode.times[0]
     at = np.searchsorted(times, np.arange(4) * BEGINNING_S - 1e-9)
-    of_car = robot.drive == "ackermann"  # its speed alone does not tell its wheels' angle
-    if of_car or given.rest.any() or episode.wheels is not None or at[-1] >= len(samples) or samples[0] != 0:
+    if given.rest.any() or episode.wheels is not None or at[-1] >= len(samples) or samples[0] != 0:
         return given.rest
     if np.diff(times[at]).min() <= 0.0:
         return given.rest
     poses, figures = episode.poses[samples[at]], robot.figures
     moved = relative(poses[::2], poses[1::2]) / np.diff(times[at])[::2, None]
+    if robot.drive == "ackermann":  # its speed alone does not tell its wheels' angle: they are where they are sent
+        sent = np.flatnonzero(given.times <= lead_s + 1e-9)
+        first, later = np.abs(moved[:, 0]) / figures["full_speed"]
+        if not len(sent) or first <= max(IN_MOTION, STEADY * later):
+            return given.rest
+        return np.array((np.clip(moved[0, 0] / figures["full_speed"], -1.0, 1.0), given.duties[sent[-1], 1]))
     turn = moved[:, 2] * figures["effective_baseline"] / 2.0
     first, later = np.stack((moved[:, 0] - turn, moved[:, 0] + turn), axis=1) / figures["full_speed"]
     in_motion = float(np.abs(first).max()) > max(IN_MOTION, STEADY * float(np.abs(later).max()))
@@ -393,11 +421,11 @@ def _wheels(robot: Robot, episodes: Sequence[LogEpisode], ticks: int, length: in
     return np.stack(measured) if whole else None
 
 
-def _ticks_of_heading(episode: LogEpisode, ticks: int, length: int) -> Floats:
+def _ticks_of_heading(episode: LogEpisode, ticks: int, lead: int, length: int) -> Floats:
     known = np.flatnonzero(np.isfinite(episode.poses[:, 2]))
     if len(known) == 0:
         return np.zeros(length)
-    return np.asarray(np.interp(np.arange(length), known * ticks, episode.poses[known, 2]))
+    return np.asarray(np.interp(np.arange(length), known * ticks + lead, episode.poses[known, 2]))
 
 
 def _travel(number: Whole, poses: Floats, rows: Whole, rate_hz: float) -> Floats:

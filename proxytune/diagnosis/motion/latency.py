@@ -214,6 +214,7 @@ def squares_by_latency(
 ) -> "Blocks":
     """Squares that expected speeds (latencies, M, 2) leave, in units of what the `usual` one of the latencies does."""
     ends = np.array([len(episode.times) for episode in log.episodes]) * round(drives.tick_hz / log.rate_hz)
+    ends += drives.lead
     rest = speeds.values - expected
     rest /= rest[usual].std(axis=0) + 1e-9
     squares = np.einsum("lmc,lmc->ml", rest, rest)

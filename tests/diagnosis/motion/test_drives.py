@@ -158,7 +158,7 @@ def test_commands_are_held_from_their_own_times_also_from_before_the_first_sampl
     assert np.flatnonzero(drives.issued[0]).tolist() == [1, 6]
     assert drives.rate_hz == pytest.approx(1.0 / 0.075)
 
-    drives = at_own_times([-0.4, -0.2, 0.05], [[0.9, 0.9], [0.6, 0.3], [0.0, 0.2]])
+    drives = at_own_times([-1.4, -1.2, 0.05], [[0.9, 0.9], [0.6, 0.3], [0.0, 0.2]])
     np.testing.assert_allclose(drives.rest, [[0.6, 0.3]])
     np.testing.assert_allclose(drives.duties[0, :4, 1], [0.3, 0.3, 0.3, 0.2])
     assert np.flatnonzero(drives.issued[0]).tolist() == [3]
@@ -248,6 +248,32 @@ def test_a_car_is_asked_for_no_more_than_its_full_speed_in_any_kind():
         np.testing.assert_allclose(duties_of(log, CAR, np.array([asked])), wanted, err_msg=command)
     with pytest.raises(LogError, match="more than the full speed"):
         duties_of(Log("log", "car", "speed_steering", 20.0, {}, ()), CAR, np.array([[99.0, 0.0]]))
+
+
+@pytest.mark.parametrize("early_s", [0.002, 0.05, 0.4])
+def test_a_command_shortly_before_the_first_pose_has_not_been_in_force_for_ever(early_s):
+    """A robot that answers with a lag stands at the first pose, or has just begun to move."""
+    first = replace(episode(np.zeros(40)), issued=np.array([0.0, 1.0]), commands=np.array([[0.5, 0.5], [0.2, 0.2]]))
+    on_time, early = gathered(first), gathered(replace(first, issued=np.array([-early_s, 1.0])))
+    lead = early.lead
+    assert on_time.lead == 0 < lead == 3 * int(np.ceil(early_s * 20.0 - 1e-9))
+    np.testing.assert_array_equal(early.rest, 0.0)
+    np.testing.assert_array_equal(early.first, on_time.first + lead)
+    np.testing.assert_array_equal(early.headings[:, lead:], on_time.headings)
+    np.testing.assert_allclose(early.duties[:, lead:], on_time.duties)
+    np.testing.assert_allclose(early.duties[0, :lead, 0].sum() / 60.0, 0.5 * early_s)
+    long_ago = gathered(replace(first, issued=np.array([-1.5, 1.0])))
+    np.testing.assert_array_equal(long_ago.rest, [[0.5, 0.5]])
+    assert long_ago.lead == 0
+
+
+def test_a_car_that_is_met_in_motion_has_its_own_speed_and_the_steering_that_was_sent():
+    x, car = 0.02 * np.arange(40), read_robot("car")
+    moving = replace(episode(x), issued=np.array([-0.01]), commands=np.array([[0.3, 0.2]]))
+    met = replace(log(moving, command="ackermann"), robot="car")
+    np.testing.assert_allclose(gather(met, car, met.episodes).rest, [[0.4 / car.figures["full_speed"], 0.2]])
+    still = replace(met, episodes=(replace(moving, poses=0.0 * moving.poses),))
+    np.testing.assert_array_equal(gather(still, car, still.episodes).rest, [[0.0, 0.0]])
 
 
 @pytest.mark.parametrize(("robot", "command"), [("car", "duty"), ("car", "wheel_speed"), ("duckiebot", "ackermann")])

@@ -23,8 +23,8 @@ from typing import Any
 
 LEFT_OUT = ("kind", "type_comment")
 """Fields of a syntax tree without a meaning: the u of u"…", and comments."""
-NOT_A_PACKAGE = ("study.toml", "pyvenv.cfg")
-"""A folder with one of these is another study, or an environment."""
+NOT_A_PACKAGE = ("study.toml", "pyvenv.cfg", "play_commands.py")
+"""A folder with one of these is another study, an environment, or the drive that a diagnosis designed."""
 
 
 def digest(*values: object, length: int = 16) -> str:

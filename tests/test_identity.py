@@ -85,8 +85,8 @@ def test_modules_are_those_of_the_folder_and_of_what_can_be_a_package_within(tmp
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text("x = 1\n")
     hidden = (".git/x.py", "__pycache__/x.py", "not-a-package/x.py", "other/study.toml", "other/x.py", ".hidden.py")
-    for name in (*hidden, "environment/pyvenv.cfg", "environment/x.py"):
-        (tmp_path / name).parent.mkdir(exist_ok=True)
+    for name in (*hidden, "environment/pyvenv.cfg", "environment/x.py", "found/next/play_commands.py"):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text("x = 1\n")
     (tmp_path / "gone.py").symlink_to("nowhere.py")
     (tmp_path / "pack" / "up").symlink_to(tmp_path)

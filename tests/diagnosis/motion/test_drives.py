@@ -268,10 +268,10 @@ def test_a_command_shortly_before_the_first_pose_has_not_been_in_force_for_ever(
 
 
 def test_a_car_that_is_met_in_motion_has_its_own_speed_and_the_steering_that_was_sent():
-    x, car = 0.02 * np.arange(40), read_robot("car")
+    x, car = 0.04 * np.arange(40), read_robot("car")
     moving = replace(episode(x), issued=np.array([-0.01]), commands=np.array([[0.3, 0.2]]))
     met = replace(log(moving, command="ackermann"), robot="car")
-    np.testing.assert_allclose(gather(met, car, met.episodes).rest, [[0.4 / car.figures["full_speed"], 0.2]])
+    np.testing.assert_allclose(gather(met, car, met.episodes).rest, [[0.8 / car.figures["full_speed"], 0.2]])
     still = replace(met, episodes=(replace(moving, poses=0.0 * moving.poses),))
     np.testing.assert_array_equal(gather(still, car, still.episodes).rest, [[0.0, 0.0]])
 

@@ -181,10 +181,10 @@ class Rules:
     """Repeated drives speak for all drives if the error is at most so many times what they do not repeat: a manoeuvre
     that never meets what is missing is repeated well, too."""
 
-    def at_end(self, value: float, span: tuple[float, float], neutral: float) -> bool:
-        """Tell whether a value lies at an end of its range that is not neutral."""
+    def at_end(self, value: float, span: tuple[float, float], *harmless: float) -> bool:
+        """Tell whether a value lies at an end of its range; an end where the effect vanishes is harmless."""
         reach = self.edge_share * (span[1] - span[0])
-        return any(abs(value - end) <= reach for end in span if end != neutral)
+        return any(abs(value - end) <= reach for end in span if end not in harmless)
 
 
 RULES = Rules()

@@ -18,7 +18,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from proxytune.arrays import NORMAL_95
-from proxytune.diagnosis.motion.drives import Drives, Floats, sum_by
+from proxytune.diagnosis.motion.drives import Drives, Floats, Whole, sum_by
 from proxytune.diagnosis.motion.innovations import (
     FIRST_GUESS,
     HUBER,
@@ -181,8 +181,7 @@ LEAST = 0.003
 def intervals(fitted: Fit) -> dict[str, tuple[float, float]]:
     """Give 95 % intervals of the fitted parameters, from the scatter between blocks."""
     gradients, hessian = derivatives_by_block(fitted, fitted.slopes)
-    inverse = np.linalg.inv(hessian.sum(axis=0) + KEPT_SOLVABLE * np.eye(len(fitted.free)))
-    known = sandwich_intervals(fitted.theta, fitted.free, fitted.drives, gradients, inverse)
+    known = sandwich_intervals(fitted.theta, fitted.free, fitted.drives, gradients, hessian.sum(axis=0))
     for coordinate in fitted.free:
         if is_stepwise(coordinate, fitted.drives.robot):
             known |= dict.fromkeys(coordinate, _stepwise_interval(fitted, coordinate))
@@ -204,13 +203,24 @@ def _stepwise_interval(fitted: Fit, coordinate: Coordinate) -> tuple[float, floa
 
 
 def sandwich_intervals(
-    theta: Theta, free: tuple[Coordinate, ...], drives: Drives, gradients: Floats, inverse: Floats
+    theta: Theta, free: tuple[Coordinate, ...], drives: Drives, gradients: Floats, hessian: Floats
 ) -> dict[str, tuple[float, float]]:
-    """95 % intervals from the spread of gradients between blocks (blocks, coordinates), and the Hessian's inverse."""
-    spread = inverse @ (gradients.T @ gradients) @ inverse * len(gradients) / max(1, len(gradients) - len(free))
+    """95 % intervals from the spread of gradients between blocks (blocks, coordinates), and the Hessian.
+
+    Values at an end of their range cannot give way to the others, whose intervals are those beside them.
+    """
+
+    def variances(chosen: Whole) -> Floats:
+        inverse = np.linalg.pinv(hessian[np.ix_(chosen, chosen)] + KEPT_SOLVABLE * np.eye(len(chosen)), hermitian=True)
+        return np.asarray(np.square(gradients[:, chosen] @ inverse).sum(axis=0))
+
+    spans = [span(coordinate, drives) for coordinate in free]
+    ends = [drives.rules.at_end(theta[names[0]], own) for names, own in zip(free, spans, strict=True)]
+    inside, spread = np.flatnonzero(~np.array(ends, dtype=bool)), variances(np.arange(len(free)))
+    spread[inside] = variances(inside)
+    spread *= len(gradients) / max(1, len(gradients) - len(free))
     found: dict[str, tuple[float, float]] = {}
-    for coordinate, variance in zip(free, np.diag(spread), strict=True):
-        low, high = span(coordinate, drives)
+    for coordinate, (low, high), variance in zip(free, spans, spread, strict=True):
         half = NORMAL_95 * float(np.sqrt(variance)) * (high - low)
         found |= {name: (max(low, theta[name] - half), min(high, theta[name] + half)) for name in coordinate}
     return found

@@ -477,9 +477,13 @@ def nudged(drives: Drives, theta: Theta, coordinate: Coordinate, share: float) -
 
 
 def at_edge(name: str, value: float, drives: Drives) -> bool:
-    """Tell whether a value lies at an end of its parameter's range that is not neutral."""
-    neutral = drives.robot.catalogue.parameters[name].neutral_value(drives.robot.figures)
-    return drives.rules.at_end(value, span((name,), drives), neutral)
+    """Tell whether a value lies at an end of its parameter's range where it does something.
+
+    It does nothing where it is neutral, or, of what a robot has by its nominal figures, at 0.
+    """
+    parameter = drives.robot.catalogue.parameters[name]
+    harmless = (parameter.neutral_value(drives.robot.figures), *((0.0,) if isinstance(parameter.neutral, str) else ()))
+    return drives.rules.at_end(value, span((name,), drives), *harmless)
 
 
 def widened(drives: Drives, theta: Theta, free: Sequence[Coordinate]) -> Drives:

@@ -184,7 +184,7 @@ def fit_multistep(fitted: Fit) -> tuple[Fit, MultistepFit | None]:
     hessian = (slopes / (1.0 + (left / scale) ** 2)[:, None] ** 1.5).T @ slopes
     _, block = np.unique(np.repeat(blocks_of(drives, windows), 3), return_inverse=True)
     sums = np.stack([np.bincount(block, column) for column in gradient.T], axis=1)
-    known = sandwich_intervals(theta, free, drives, sums, np.linalg.pinv(hessian, hermitian=True))
+    known = sandwich_intervals(theta, free, drives, sums, hessian)
     return evaluate(drives, theta, fitted.free, fitted.noise), MultistepFit(best[1], best[2], known)
 
 

@@ -227,6 +227,13 @@ OUTSIDE: tuple[Case, ...] = tuple(
 )
 """Effects that neither the catalogue nor the first generator has."""
 
+NAMED_SINCE = {"second brake_before_reversing": "reversal_pause"}
+"""Cases that were outside the catalogue until it had such an effect, with its name."""
+OTHER_FORM += tuple(
+    replace(case, right=((NAMED_SINCE[case.name],),), depends_on="") for case in OUTSIDE if case.name in NAMED_SINCE
+)
+OUTSIDE = tuple(case for case in OUTSIDE if case.name not in NAMED_SINCE)
+
 CLEAN: tuple[Case, ...] = tuple(replace(_case(n + n // 4, f"clean {n}", ()), noise=NOISES[n % 4]) for n in range(16))
 """Nothing is hidden."""
 

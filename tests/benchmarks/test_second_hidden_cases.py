@@ -244,7 +244,7 @@ def test_there_are_enough_cases_of_every_kind_hiding_every_effect_and_no_name_or
 
 def test_every_case_says_what_is_right_or_what_its_effect_depends_on_and_half_are_coarse():
     for case in CASES.values():
-        assert {name for names in case.right for name in names} <= MOTION_EFFECTS | {"inertia"}
+        assert {name for names in case.right for name in names} <= MOTION_EFFECTS | {"inertia", "reversal_pause"}
         assert len(case.right) == (0 if case.depends_on else len(case.effects))
     for kind in (IN_FORM, OTHER_FORM, PAIRS, OUTSIDE, CLEAN):
         assert 0.4 < np.mean([case.integration == "coarse" for case in kind]) < 0.6

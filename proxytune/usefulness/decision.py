@@ -363,16 +363,16 @@ def compare_choices(inputs: Mapping[str, Comparison], asked: Asked, seed: int = 
     found = {name: decide(one, asked, None, seed) for name, one in inputs.items()}
     choices = []
     for pair in itertools.combinations(found, 2):
-        chosen_agents = [found[name].observed.proxy_winners[0] for name in pair]
-        # The target is one: the draws of both are the same.
-        regrets = [found[pair[0]].expected_regret[agent] for agent in chosen_agents]
-        better, worse = (0, 1) if regrets[0] <= regrets[1] else (1, 0)
-        draws, agents = found[pair[0]].draws, inputs[pair[0]].agents
+        # The target is one: regrets and draws of both are the same.
+        target, agents = found[pair[0]], inputs[pair[0]].agents
+        winner = {name: found[name].observed.proxy_winners[0] for name in pair}
+        better, worse = sorted(pair, key=lambda name: target.expected_regret[winner[name]])
+        gain = target.expected_regret[winner[worse]] - target.expected_regret[winner[better]]
         ends: tuple[float | None, float | None] = (None, None)
-        if draws is not None:
-            lead, other = (draws[:, agents.index(chosen_agents[place])] for place in (better, worse))
+        if target.draws is not None:
+            lead, other = (target.draws[:, agents.index(winner[name])] for name in (better, worse))
             ends = interval(lead - other)
-        choices.append(Difference(pair[better], pair[worse], regrets[worse] - regrets[better], *ends, "regret"))
+        choices.append(Difference(better, worse, gain, *ends, "regret"))
     return tuple(choices)
 
 

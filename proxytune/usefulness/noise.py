@@ -193,10 +193,7 @@ class Chance:
 
 
 def chance(inputs: Comparison, *, permutations: int = 1000, seed: int = 0) -> Chance:
-    """Permute which agent got which of the proxy's scores; the metrics of one agent stay together.
-
-    Of up to seven agents every order is looked at, and none is drawn.
-    """
+    """Permute which agent got which of the proxy's scores, all orders of few; one agent's metrics stay together."""
     in_proxy, on_target = inputs.means
     exact = len(in_proxy) <= MOST_ENUMERATED
     if exact:

@@ -57,11 +57,7 @@ def too_few(table: ScoreTable, name: str) -> str:
 
 
 def bootstrap_means(inputs: Comparison, *, resamples: int, seed: int) -> Means:
-    """Mean scores of resampled episodes, in the proxy and on the target: (resamples, agents, metrics) each.
-
-    Where all agents drove the same episodes, all get the same resample of their starts, each with all its repeats;
-    where both domains have the same starts, both do.
-    """
+    """Mean scores of resampled episodes, in the proxy and on the target: (resamples, agents, metrics) each."""
     rng = np.random.default_rng(seed)
     if inputs.paired:
         counts = draw_counts(inputs.target, rng, resamples)

@@ -22,6 +22,7 @@ import numpy as np
 
 from proxytune.arrays import Floats
 from proxytune.errors import ScoresError
+from proxytune.scores import ScoreTable
 from proxytune.usefulness.comparison import Comparison
 from proxytune.usefulness.decision import Decision
 from proxytune.usefulness.resampling import CONFIDENCE
@@ -131,8 +132,7 @@ def sequential_test(inputs: Comparison, column: int = 0, *, seed: int = 0) -> Se
         ScoresError: If scores are not within 0 and 1, an agent has one rollout, or outcomes are sorted.
     """
     metric, agents = inputs.metrics[column], inputs.agents
-    values = [_order(row[driven], metric.direction) for row, driven in zip(
-        inputs.target.values[..., column], inputs.target.driven, strict=True)]  # fmt: skip
+    values = _rollouts(inputs.target, column, metric.direction)
     rounds = min(map(len, values))
     if len(agents) ** 2 * rounds > MOST_BETS:
         raise ScoresError(f"--sequential: {len(agents)} agents are too many to be bet on; test those that may be best")
@@ -143,8 +143,7 @@ def sequential_test(inputs: Comparison, column: int = 0, *, seed: int = 0) -> Se
         raise ScoresError("--sequential: takes a row per rollout on the target; there is one row an agent")
     if is_sorted(inputs.target, column):
         raise ScoresError(f"--sequential: {SORTED}; give rollouts in the order in which they were made")
-    foretold = np.array([_order(row[driven], metric.direction).mean() for row, driven in zip(
-        inputs.proxy.values[..., column], inputs.proxy.driven, strict=True)])  # fmt: skip
+    foretold = np.array([row.mean() for row in _rollouts(inputs.proxy, column, metric.direction)])
     outcomes = np.stack([row[:rounds] for row in values])[None]
     bet = foretold if foretold.min() >= 0.0 and foretold.max() <= 1.0 else None
     wealth = wealth_of(outcomes, bet)[0]
@@ -160,8 +159,10 @@ def sequential_test(inputs: Comparison, column: int = 0, *, seed: int = 0) -> Se
     return Sequential(winner, at, rounds, evidence, threshold, expected)
 
 
-def _order(values: Floats, direction: str) -> Floats:
-    return values if direction == "max" else 1.0 - values
+def _rollouts(table: ScoreTable, column: int, direction: str) -> list[Floats]:
+    """Each agent's scores in the order of the table, more being better."""
+    rows = [row[driven] for row, driven in zip(table.values[..., column], table.driven, strict=True)]
+    return rows if direction == "max" else [1.0 - row for row in rows]
 
 
 def wealth_of(outcomes: Floats, foretold: Floats | None = None) -> Floats:
@@ -170,9 +171,8 @@ def wealth_of(outcomes: Floats, foretold: Floats | None = None) -> Floats:
     These are (experiments, agents, rounds), the proxy's rates (agents,), None to bet without; the answer is
     (experiments, rounds, agents, rivals), infinite against itself.
     """
-    starts = [np.full(outcomes.shape[1], 0.5)] if foretold is None else [np.full(outcomes.shape[1], 0.5), foretold]
-    weights = [2.0 * PRIOR, PROXY_PRIOR]
-    bets = [_log_wealth(outcomes, rate, weight) for rate, weight in zip(starts, weights, strict=False)]
+    bets = [_log_wealth(outcomes, np.full(outcomes.shape[1], 0.5), 2.0 * PRIOR)]
+    bets += [] if foretold is None else [_log_wealth(outcomes, foretold, PROXY_PRIOR)]
     wealth = np.mean(np.exp(np.minimum(bets, 600.0)), axis=0)
     rows = np.arange(outcomes.shape[1])
     wealth[..., rows, rows] = np.inf

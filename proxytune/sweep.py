@@ -238,8 +238,7 @@ def run_sweep(run: StudyRun, sweep: SweepRecord, discrepancy: Study | None = Non
         what = f"{sweep.parameter} {number} of {len(sweep.points)}"
         scored = run.evaluate(_theta(sweep, value), what)
         if replays is not None:
-            planned = plan_episodes(replays.settings, _theta(sweep, value), replays.settings.seed)
-            replays.outcomes(planned, f"POD, {what}")
+            replays.outcomes(plan_episodes(replays.settings, _theta(sweep, value)), f"POD, {what}")
         came = "failed" if scored.prpv is None else f"PRPV {scored.prpv:g}"
         run.watcher.finished(f"{what}, at {value:g}: {came}")
     if replays is not None:
@@ -252,8 +251,8 @@ def curve_of(run: StudyRun, sweep: SweepRecord) -> SweepCurve | None:
     if len(points) < len(sweep.points):
         return None
     unit = run.study.family.parameters[sweep.parameter].unit
-    metrics = tuple(metric.name for metric in run.settings.metrics)
-    return SweepCurve(sweep.parameter, unit, sweep.base, metrics, tuple(points), bool(sweep.replays))
+    names = run.settings.metric_names
+    return SweepCurve(sweep.parameter, unit, sweep.base, names, tuple(points), bool(sweep.replays))
 
 
 def pod_mean(values: Sequence[float]) -> PodMean:
@@ -292,7 +291,7 @@ def _point(run: StudyRun, sweep: SweepRecord, value: float) -> SweepPoint | None
 def _pod(run: StudyRun, sweep: SweepRecord, value: float) -> dict[str, PodMean] | None:
     # Its first agent's commands are replayed, as discrepancy_study has it.
     replayed = replace(run.settings, agents=run.settings.agents[:1])
-    planned = plan_episodes(replayed, _theta(sweep, value), replayed.seed)
+    planned = plan_episodes(replayed, _theta(sweep, value))
     known = run.store.outcomes(sweep.replays, _theta(sweep, value))
     if not all(episode in known for episode in planned):
         return None

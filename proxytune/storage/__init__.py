@@ -1,7 +1,7 @@
 """The folder of a study: study.db with its rows, and its lock.
 
 store     Store, TrialRecord, SweepRecord, State, theta_json, is_begun, FILE_NAME: values in and out of study.db
-folder    locked, refuse_links, FAMILIES: one process at a time, and no links that lead elsewhere
+folder    locked, refuse_links, FAMILIES, MADE: one process at a time, and no links that lead elsewhere
 repair    salvage, Salvage: what is whole of a damaged study.db
 database  its tables, its format, and the checks on opening; for this room alone
 """

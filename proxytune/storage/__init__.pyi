@@ -1,4 +1,4 @@
-from .folder import FAMILIES as FAMILIES, locked as locked
+from .folder import FAMILIES as FAMILIES, MADE as MADE, locked as locked
 from .repair import salvage as salvage
 from .store import (
     FILE_NAME as FILE_NAME,

@@ -16,7 +16,9 @@ from proxytune.errors import BusyError, StoreError
 LOCK = "study.lock"
 FAMILIES = "families"
 """The folder in which each family of a study has its own."""
-NAMES = (LOCK, "study.db", FAMILIES, "figures", "loop", "rescored", "teaching")
+MADE = (FAMILIES, "figures", "loop", "rescored", "teaching")
+"""Folders that running a study makes."""
+NAMES = (LOCK, "study.db", *MADE)
 """What running a study writes to or into; what else it writes replaces whatever has the name."""
 
 

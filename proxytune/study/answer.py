@@ -10,9 +10,10 @@ driven twice from the same start, here and in the pre-flight, tells the noise of
 on it.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 
@@ -30,7 +31,7 @@ from proxytune.study.opening import Study
 from proxytune.study.preflight import placement_pairs, run_preflight
 from proxytune.study.run import AfterEarlier, goal_of, knowledge_of, record, retry_failed, run_trials, stopped
 from proxytune.study.settings import StudySettings
-from proxytune.study.study_run import StudyRun, evaluate_outcomes, in_common, outputs_of, plan_episodes, score_table
+from proxytune.study.study_run import StudyRun, evaluate_outcomes, outputs_of, plan_episodes, score_table
 from proxytune.usefulness import Assessment, Donors, Expectation, assess, donors_of, expect
 
 MOST_FINALISTS = 3
@@ -134,7 +135,7 @@ def run_nominal(run: StudyRun) -> None:
         run.store.save_fact(NOMINAL, dict(theta))
         # Where it fails, nothing is said of it.
         with suppress(EpisodeError):
-            run.outcomes(plan_episodes(run.settings, theta, run.settings.seed), "nominal θ")
+            run.outcomes(plan_episodes(run.settings, theta), "nominal θ")
     else:
         run.watcher.begin("no nominal θ", len(run.settings.agents) * run.settings.starts)
 
@@ -195,10 +196,10 @@ def confirmation_of(run: StudyRun, trials: Sequence[TrialRecord], learnt: Knowle
     answer = _finalist(run, answer.trial, tuple(tuple(one.values()) for one in known))
     tables = [table for one in answer.fresh if (table := _table(run.study, one))]
     expected = _expect(run, tables, _donors(run, driven)) if tables else None
-    if expected and (whole := _assessed(run.study, answer.fresh)):
+    if expected and (table := _table(run.study, *answer.fresh)):
         # All repetitions together break ties by a single crash: what is told is the mean of each by itself
         mean, low, high = expected.prpv.value
-        value = round(mean)
+        value, whole = round(mean), assess(proxy=table, target=run.study.target, metrics=settings.metrics)
         inner = replace(whole.prpv_interval, value=value, low=low, high=high)
         told = replace(whole, prpv=replace(whole.prpv, value=value), prpv_interval=inner, noise_floor=expected.floor)
         answer = replace(answer, assessment=told)
@@ -266,7 +267,7 @@ def _learn_again(run: StudyRun, learnt: Knowledge, driven: Sequence[Finalist]) -
 
     fresh = [trial_of(one, outcomes, -number) for one in driven for number, outcomes in enumerate(one.fresh, start=1)]
     unvisited = [one for one in driven if one.trial.number == UNVISITED]
-    own = [run.known(plan_episodes(run.settings, one.trial.theta, run.settings.seed)).values() for one in unvisited]
+    own = [run.known(plan_episodes(run.settings, one.trial.theta)).values() for one in unvisited]
     fresh += [trial_of(one, outcomes, 0) for one, outcomes in zip(unvisited, own, strict=True)]
     # A family that draws nothing does the same again, which tells nothing.
     told = {(one.values, one.outcome) for one in learnt.trials}
@@ -304,7 +305,7 @@ def _donors(run: StudyRun, driven: Sequence[Finalist]) -> Donors:
     metrics = run.settings.metrics
     pairs = [np.moveaxis(placement_pairs(run)[..., : len(metrics)], 1, 0)]
     for one in driven:
-        own = run.known(plan_episodes(run.settings, one.trial.theta, run.settings.seed))
+        own = run.known(plan_episodes(run.settings, one.trial.theta))
         pairs += [np.stack([_cells(run, own.values()), _cells(run, fresh)]) for fresh in one.fresh]
     return donors_of(pairs, len(metrics))
 
@@ -318,8 +319,7 @@ def _expect(run: StudyRun, tables: Sequence[ScoreTable], donors: Donors) -> Expe
 def _cells(run: StudyRun, outcomes: Iterable[Outcome]) -> Floats:
     """The metrics of each agent and start, in the order in which they are planned; NaN where one failed."""
     known = {(one.episode.agent, one.episode.start): one.metrics or {} for one in outcomes}
-    places = [(agent, start) for agent in run.settings.agents for start in range(run.settings.starts)]
-    names = [metric.name for metric in run.settings.metrics]
+    places, names = product(run.settings.agents, range(run.settings.starts)), run.settings.metric_names
     return np.array([[known.get(place, {}).get(name, np.nan) for name in names] for place in places])
 
 
@@ -329,21 +329,7 @@ def most_confirmation_episodes(settings: StudySettings) -> int:
     return repetitions * len(settings.agents) * settings.starts if settings.confirm else 0
 
 
-def _table(study: Study, outcomes: Sequence[Outcome]) -> ScoreTable | None:
-    """The scores of one repetition; None if an agent has no episode that worked."""
-    worked = {outcome.episode.agent for outcome in outcomes if outcome.metrics is not None}
-    return score_table(outcomes) if worked == set(study.settings.agents) else None
-
-
-def _assessed(study: Study, runs: Sequence[Sequence[Outcome]]) -> Assessment | None:
-    """All fresh episodes as one table; of several repetitions, each start is another episode every time."""
-    scored: dict[tuple[str, str], Mapping[str, float]] = {}
-    for repetition, outcomes in enumerate(runs):
-        for one in outcomes:
-            label = f"{one.episode.start}/{repetition}" if len(runs) > 1 else str(one.episode.start)
-            if one.metrics is not None:
-                scored[one.episode.agent, label] = one.metrics
-    if {agent for agent, _ in scored} != set(study.settings.agents):
-        return None
-    proxy = ScoreTable.from_episodes(in_common(scored))
-    return assess(proxy=proxy, target=study.target, metrics=study.settings.metrics)
+def _table(study: Study, *repetitions: Sequence[Outcome]) -> ScoreTable | None:
+    """The scores of repetitions; None if an agent has no episode that worked."""
+    worked = {one.episode.agent for outcomes in repetitions for one in outcomes if one.metrics is not None}
+    return score_table(*repetitions) if worked == set(study.settings.agents) else None

@@ -56,10 +56,6 @@ class Source:
     trials: Mapping[Instance, Scores]  # scores of each domain instance, failed episodes left out
     placement: Mapping[str, Mapping[str, float]] = field(default_factory=dict)  # variance by it, which a table knows
 
-    def episode(self, theta: Instance, agent: str, start: int) -> Episode:
-        """An episode of it."""
-        return Episode(theta, agent, start, episode_seed(self.facts["seed"], start))
-
 
 def learn(run: StudyRun) -> tuple[str, ...]:
     """Copy what earlier studies know into the store, unless it has been.
@@ -277,7 +273,7 @@ def _check_like(run: StudyRun, source: Source, used: str) -> None:
     if lacks := [agent for agent in settings.agents if agent not in agents]:
         raise refused(f"has not driven {', '.join(lacks)}; remove it")
     scored = {name for scores in source.trials.values() for one in scores.values() for name in one}
-    if lacks := [metric.name for metric in settings.metrics if metric.name not in scored]:
+    if lacks := [name for name in settings.metric_names if name not in scored]:
         raise refused(f"has no scores of {', '.join(lacks)}; remove it")
     boxes = [sorted(name for name, _ in next(iter(source.trials))), sorted(settings.space.names)]
     if boxes[0] != boxes[1]:
@@ -307,7 +303,8 @@ def _check_again(run: StudyRun, source: Source) -> None:
     cells = [(theta, *key) for theta, scores in source.trials.items() for key in sorted(scores)]
     mine = [cell for cell in cells if cell[1] in run.settings.agents and cell[2] < run.settings.starts]
     chosen = [mine[row] for row in np.unique(np.linspace(0, len(mine) - 1, AGAIN).round().astype(int))]
-    planned = [source.episode(*cell) for cell in chosen]
+    seed = source.facts["seed"]
+    planned = [Episode(theta, agent, start, episode_seed(seed, start)) for theta, agent, start in chosen]
     before = run.spent.episodes
     found = run.outcomes(planned, f"episodes of {source.path.name} again")
     run.spent += Spent(unused=run.spent.episodes - before)
@@ -322,7 +319,7 @@ def _check_again(run: StudyRun, source: Source) -> None:
 
 
 def _metrics(run: StudyRun) -> set[str]:
-    return {*run.study.family.metrics, *(metric.name for metric in run.settings.metrics)}
+    return {*run.study.family.metrics, *run.settings.metric_names}
 
 
 def _means(scores: Scores, settings: StudySettings, names: Sequence[str]) -> list[list[float | None]]:

@@ -60,7 +60,7 @@ def study_facts(study: Study) -> dict[str, Any]:
     settings, learns = study.settings, study.engine.learns_from == "outputs"
     said = {key: getattr(settings, key) for key, value in UNSAID.items() if getattr(settings, key) != value}
     versions = getattr(study.family, "versions", None)
-    table = study.target if learns else study.target.select([metric.name for metric in settings.metrics])
+    table = study.target if learns else study.target.select(settings.metric_names)
     inner = table.select(sorted(table.metrics)).arrange(agents=sorted(table.agents), episodes=sorted(table.episodes))
     return {
         "family": settings.family,

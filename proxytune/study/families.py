@@ -146,7 +146,7 @@ def tuned_family(run: StudyRun, result: StudyResult) -> TunedFamily:
     """A family's study as it stands, with what its episodes cost."""
     settings = run.settings
     # The search's own and the fresh ones
-    seeds = [settings.seed, *(fresh_seed(settings.seed, number) for number in range(1, settings.confirm + 1))]
+    seeds = [fresh_seed(settings.seed, repetition) for repetition in range(settings.confirm + 1)]
     planned = [one for seed in seeds for one in plan_episodes(settings, result.best.trial.theta, seed)]
     seconds = tuple(outcome.seconds for outcome in run.known(planned).values())
     return TunedFamily(settings.family_name, result, seconds_of(run, result.trials), seconds)

@@ -32,7 +32,7 @@ from proxytune.usefulness import MEASURES, Measure, compare, start_of, starts_of
 
 def with_scores(settings: StudySettings) -> tuple[StudySettings, tuple[str, ...]]:
     """The study of those agents that the target has scores of, and who is left out on either side, in a line each."""
-    scored = _read(settings, [metric.name for metric in settings.metrics]).agents
+    scored = _read(settings, settings.metric_names).agents
     there = tuple(agent for agent in settings.agents if agent in scored)
     missing = [agent for agent in settings.agents if agent not in scored]
     beyond = [agent for agent in scored if agent not in settings.agents]
@@ -66,7 +66,7 @@ def read_target(settings: StudySettings, family: DomainFamily) -> tuple[ScoreTab
             return False
         return True
 
-    compared = [metric.name for metric in settings.metrics]
+    compared = settings.metric_names
     # What a search can learn from at no cost
     others = [name for name in family.metrics if name not in compared and has_in_full(name)]
     chosen = _read(settings, [*compared, *others]).arrange(agents=settings.agents)
@@ -206,7 +206,7 @@ def open_settings(settings: StudySettings, given: Any = None) -> Study:
 def open_bank(settings: StudySettings) -> Study:
     """Load the family of a bank, a study without a target, whose table of scores has zeros; raises as `open_study`."""
     family = load_family(settings, settings.proxy)
-    names = dict.fromkeys((*(metric.name for metric in settings.metrics), *family.metrics))
+    names = dict.fromkeys((*settings.metric_names, *family.metrics))
     cells = itertools.product(settings.agents, range(settings.starts))
     table = ScoreTable.from_episodes({cell: dict.fromkeys(names, 0.0) for cell in cells})
     return Study(settings, family, table, family.identity, code=user_code(settings))

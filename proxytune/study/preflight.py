@@ -23,6 +23,7 @@ import functools
 import itertools
 import re
 import warnings
+from collections import Counter
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import ceil
@@ -293,7 +294,7 @@ def _movement(study: Study, look: int, interval: Interval, known: Mapping[Episod
     pairs = itertools.product(_places(settings, look), settings.agents)
     driven = [[known[one] for one in _group(settings, agent, place, [interval])] for place, agent in pairs]
     whole = [group for group in driven if all(outcome.metrics is not None for outcome in group)]
-    names = [metric.name for metric in settings.metrics]
+    names = settings.metric_names
     values = np.array([[[(o.metrics or {})[name] for name in names] for o in group] for group in whole])
     return judge(interval, names, values.reshape(-1, 4, len(names)))
 
@@ -348,9 +349,8 @@ def placement_variance(run: StudyRun) -> Floats | None:
 
 def shares_starts(study: Study) -> bool:
     """True if the target was driven from the study's own starts, each as often, by every agent."""
-    starts = [start_of(label) for label in study.target.episodes]
+    each = Counter(map(start_of, study.target.episodes))
     wanted = {str(start) for start in range(study.settings.starts)}
-    each = {start: starts.count(start) for start in starts}
     return study.target.complete and set(each) == wanted and len(set(each.values())) == 1
 
 

@@ -72,10 +72,10 @@ def run_or_prune(
 ) -> list[TrialRecord | None]:
     """Simulate what is missing of the trials until each is through or pruned, and give those that were pruned."""
     study, place = run.study, {agent: number for number, agent in enumerate(rule.order)}
-    plans: list[Plan] = []
-    for trial in trials:
-        episodes = plan_episodes(study.settings, trial.theta, study.settings.seed)
-        plans.append((trial, sorted(episodes, key=lambda one: place[one.agent])))
+    plans = [
+        (trial, sorted(plan_episodes(study.settings, trial.theta), key=lambda one: place[one.agent]))
+        for trial in trials
+    ]
     planned, plan_at = [one for _, episodes in plans for one in episodes], {plan[1][0].theta: plan for plan in plans}
     before = run.known(planned)
 
@@ -112,9 +112,7 @@ def rescored_pruned(run: StudyRun, trial: TrialRecord) -> TrialRecord:
 def spared(run: StudyRun, trials: Sequence[TrialRecord]) -> tuple[int, float]:
     """Count the episodes that pruned trials did without, none begun in vain, and the seconds of their like."""
     settings, seconds = run.settings, run.store.seconds()
-    planned = [
-        episode for trial in trials if trial.decided for episode in plan_episodes(settings, trial.theta, settings.seed)
-    ]
+    planned = [one for trial in trials if trial.decided for one in plan_episodes(settings, trial.theta)]
     known = run.known(planned)
     missing = [episode for episode in planned if episode not in known]
     return len(missing), sum(seconds.get((episode.agent, episode.start), 0.0) for episode in missing)

@@ -7,6 +7,7 @@ optimisers.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import islice
 from typing import Literal, cast
 
 from proxytune.errors import InputError, RunError
@@ -214,12 +215,9 @@ def _answers(trials: tuple[TrialRecord, ...], learnt: Knowledge) -> tuple[TrialR
 
 
 def _failures(run: StudyRun, trials: tuple[TrialRecord, ...]) -> tuple[str, ...]:
-    lines: list[str] = []
-    for trial in trials:
-        if trial.failed_episodes and len(lines) < FAILURES_TOLD:
-            driven = run.known(run.episodes_of(trial)).values()
-            lines += [f"trial {trial.number}: {failure_of(outcome)}" for outcome in driven if outcome.metrics is None]
-    return tuple(lines[:FAILURES_TOLD])
+    driven = ((trial.number, run.known(run.episodes_of(trial))) for trial in trials if trial.failed_episodes)
+    failed = ((number, one) for number, known in driven for one in known.values() if one.metrics is None)
+    return tuple(f"trial {number}: {failure_of(one)}" for number, one in islice(failed, FAILURES_TOLD))
 
 
 def with_metrics(study: Study, metrics: Sequence[Metric]) -> Study:

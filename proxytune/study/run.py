@@ -43,7 +43,7 @@ def retry_failed(run: StudyRun) -> None:
             # Where fewer have failed than the trial says, they were tried again before this process.
             if len(failed) != trial.failed_episodes or any(episode in run.corrected for episode in failed):
                 # In full, also if it was pruned before; θ of later trials stay what they are.
-                planned = plan_episodes(run.settings, trial.theta, run.settings.seed)
+                planned = plan_episodes(run.settings, trial.theta)
                 run.outcomes(planned, f"trial {trial.number} again")
                 run.save_trials(record(trial.number, run.evaluation_of(trial)))
 
@@ -180,7 +180,7 @@ def stopped(run: StudyRun, done: Sequence[TrialRecord]) -> str:
 def seconds_of(run: StudyRun, done: Sequence[TrialRecord]) -> float:
     """Seconds that the episodes of finished trials have taken, all runs together, divided by the processes [s]."""
     settings = run.settings
-    seeds = {episode.seed for episode in plan_episodes(settings, {}, settings.seed)}
+    seeds = {episode.seed for episode in plan_episodes(settings, {})}
     return run.store.seconds_of_trials(run.study.objective.name, len(done), seeds) / settings.jobs
 
 

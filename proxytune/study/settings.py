@@ -18,7 +18,7 @@ from proxytune.scores import Metric
 from proxytune.search import DEFAULT_ENGINE, SCORE_ENGINE
 from proxytune.settings import Section, nearest, read_settings
 from proxytune.space import Interval, Space
-from proxytune.storage import FAMILIES
+from proxytune.storage import FAMILIES, MADE as MADE
 
 
 def metrics_of(read: Section) -> tuple[Metric, ...]:
@@ -74,8 +74,6 @@ SUFFIXES = (
     ".tflite",
 )  # fmt: skip
 """Of files with weights."""
-MADE = ("families", "figures", "loop", "rescored", "teaching")
-"""Folders that running a study makes."""
 NAMED = 3
 """So many files are named at most."""
 
@@ -203,6 +201,11 @@ class StudySettings:
     def loaded_agents(self) -> tuple[str, ...]:
         """The name by which each agent is loaded."""
         return tuple(self.aliases.get(agent, agent) for agent in self.agents)
+
+    @property
+    def metric_names(self) -> tuple[str, ...]:
+        """The names of the metrics, in their order."""
+        return tuple(metric.name for metric in self.metrics)
 
     @property
     def folder(self) -> Path:

@@ -53,15 +53,16 @@ class Evaluation:
         return self.measures.get("prpv")
 
 
-def plan_episodes(settings: StudySettings, theta: Theta, seed: int) -> list[Episode]:
-    """The episodes that score a domain instance: every agent from every start."""
-    instance, seeds = instance_of(theta), [episode_seed(seed, start) for start in range(settings.starts)]
+def plan_episodes(settings: StudySettings, theta: Theta, seed: int | None = None) -> list[Episode]:
+    """The episodes that score a domain instance, every agent from every start; the study's seed unless given one."""
+    study_seed = settings.seed if seed is None else seed
+    instance, seeds = instance_of(theta), [episode_seed(study_seed, start) for start in range(settings.starts)]
     return [Episode(instance, agent, start, own) for agent in settings.agents for start, own in enumerate(seeds)]
 
 
 def needed_metrics(settings: StudySettings, family: DomainFamily) -> list[str]:
     """The metrics of a family that agents are compared by: an episode without one of them has failed."""
-    return [metric.name for metric in settings.metrics if metric.name in family.metrics]
+    return [name for name in settings.metric_names if name in family.metrics]
 
 
 def with_metrics_needed(outcome: Outcome, needed: Sequence[str]) -> Outcome:
@@ -110,20 +111,28 @@ def evaluate_outcomes(study: Study, theta: Theta, outcomes: Sequence[Outcome]) -
 
 def disagreement_of(study: Study, proxy: ScoreTable, agents: Sequence[str]) -> Floats:
     """|α_proxy − α_target| of each pair of these agents, in their order; eq. (4) sums it up to PRPV."""
-    metrics = study.settings.metrics
-    names = [metric.name for metric in metrics]
-    sides = [table.select(names).arrange(agents=agents).means for table in (proxy, study.target)]
-    ranked = [dominance(means, metrics) for means in sides]
-    return np.abs(ranked[0] - ranked[1])
+    settings = study.settings
+    sides = (table.select(settings.metric_names).arrange(agents=agents) for table in (proxy, study.target))
+    one, other = (dominance(side.means, settings.metrics) for side in sides)
+    return np.abs(one - other)
 
 
-def score_table(outcomes: Sequence[Outcome]) -> ScoreTable:
-    """The scores of the episodes that worked, labelled by their start, in the metrics that all of them have."""
-    worked = {(one.episode.agent, str(one.episode.start)): one.metrics for one in outcomes if one.metrics is not None}
-    return ScoreTable.from_episodes(in_common(worked))
+def score_table(*repetitions: Iterable[Outcome]) -> ScoreTable:
+    """The scores of the episodes that worked, in the metrics that all of them have, labelled by their start.
+
+    Of several repetitions each start is another episode every time, labelled START/REPETITION.
+    """
+    several = len(repetitions) > 1
+    worked = {
+        (one.episode.agent, f"{one.episode.start}/{number}" if several else str(one.episode.start)): one.metrics
+        for number, outcomes in enumerate(repetitions)
+        for one in outcomes
+        if one.metrics is not None
+    }
+    return ScoreTable.from_episodes(_in_common(worked))
 
 
-def in_common(scored: Mapping[tuple[str, str], Mapping[str, float]]) -> dict[tuple[str, str | int], dict[str, float]]:
+def _in_common(scored: Mapping[tuple[str, str], Mapping[str, float]]) -> dict[tuple[str, str | int], dict[str, float]]:
     """Scores by agent and episode, in the metrics that every one of them has."""
     whole = [name for name in next(iter(scored.values()), {}) if all(name in scores for scores in scored.values())]
     return {key: {name: scores[name] for name in whole} for key, scores in scored.items()}
@@ -307,7 +316,7 @@ class StudyRun:
 
     def evaluate(self, theta: Theta, what: str) -> Evaluation:
         """Score a domain instance by every agent from every start, unless one fails and the study is to stop then."""
-        self.outcomes(plan_episodes(self.settings, theta, self.settings.seed), what)
+        self.outcomes(plan_episodes(self.settings, theta), what)
         evaluation = self.evaluation(theta)
         assert evaluation is not None
         return evaluation
@@ -316,7 +325,7 @@ class StudyRun:
         """The score of a domain instance; None if an episode of it has not been simulated."""
         key = instance_of(theta)
         if key not in self._evaluations:
-            planned = plan_episodes(self.settings, theta, self.settings.seed)
+            planned = plan_episodes(self.settings, theta)
             known = self.known(planned)
             if len(known) < len(planned):
                 return None
@@ -331,7 +340,7 @@ class StudyRun:
 
     def episodes_of(self, trial: TrialRecord) -> list[Episode]:
         """The episodes that a trial stands on: all, or those of the agents decided before it was pruned."""
-        planned = plan_episodes(self.settings, trial.theta, self.settings.seed)
+        planned = plan_episodes(self.settings, trial.theta)
         return [episode for episode in planned if not trial.decided or episode.agent in trial.decided]
 
     def learn(self, trials: Iterable[Trial], goal: Goal) -> Knowledge:
@@ -420,4 +429,4 @@ def measure_agents(settings: StudySettings, model: Path, seed: int, watcher: Wat
             if not left[agent]:
                 watcher.finished(f"agent {agent} measured")
     scored = {(episode.agent, label): metrics[episode] for episode, label in labels.items()}
-    return ScoreTable.from_episodes(in_common(scored))
+    return ScoreTable.from_episodes(_in_common(scored))

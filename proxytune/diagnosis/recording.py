@@ -100,8 +100,8 @@ def log_text(log: Log, source: str) -> str:
     pose = f"x, y with {POSITION_NOISE_M:g} m, heading with {HEADING_NOISE_RAD:g} rad of white noise (1 sigma)"
     facts = {"format": 1, "name": log.name, "robot": log.robot, "command": log.command, "rate_hz": log.rate_hz}
     facts |= {"pose": pose, "measured": False, "source": source}
-    facts |= {"map": Path(log.frames.road).name} if log.frames else {}
-    return tomlkit.dumps(facts | ({"camera": CAMERA} if log.frames else {}))
+    facts |= {"map": Path(log.frames.road).name, "camera": CAMERA} if log.frames else {}
+    return tomlkit.dumps(facts)
 
 
 def samples_text(log: Log) -> str:

@@ -15,7 +15,7 @@ from proxytune.arrays import one_thread
 from proxytune.diagnosis.answer import Estimate, Progress, verdict
 from proxytune.diagnosis.camera import error, selection
 from proxytune.diagnosis.camera.appearance import Appearance, changes, look_at
-from proxytune.diagnosis.camera.edges import DISTORTION, MOVING, READOUT, Gathered, Tape, effects_of, gather_views
+from proxytune.diagnosis.camera.edges import DISTORTION, MOVING, READOUT, Gathered, effects_of, gather_views
 from proxytune.diagnosis.camera.fitting import CameraFit
 from proxytune.diagnosis.stages import Stages, facts_of
 from proxytune.driving import LINES, Robot
@@ -33,11 +33,10 @@ def describe_map(fit: CameraFit) -> error.LaidMap:
     degrees = np.array((1.0, 1.0, np.degrees(1.0)))
     offsets = zip(("x_m", "y_m", "heading_deg"), fit.state.offset * degrees, fit.offset_sd * degrees, strict=True)
     offset = {name: error.estimate_of(value, sd, name.rpartition("_")[-1]) for name, value, sd in offsets}
-    stretches = fit.views.markings.stretches
-    tape, lines = Tape(stretches), []
+    tape, lines = fit.views.tape, []
     first = tape.size - len(WIDTHS)
     widths = zip(WIDTHS, fit.state.tape[first:], fit.tape_sd[first:], strict=True)
-    for stretch in range(stretches):
+    for stretch in range(tape.stretches):
         for number, name in enumerate(LINES):
             place = tape.shift(np.array(stretch), np.array(number))
             value, sd = float(fit.state.tape[place]), float(fit.tape_sd[place])
@@ -65,7 +64,7 @@ def conclude(
     unseen = [effect for effect in selection.hidden_effects(named.full, fitted) if effect not in fitted]
     dark = [name for name, figure in look.figures.items() if not figure.identified]
     changed = changes(look)
-    hidden = effects_of(tuple(name for name in (*unseen, *dark) if effect_of(name) not in changed))
+    hidden = effects_of(name for name in (*unseen, *dark) if effect_of(name) not in changed)
     readout = named.full.theta[READOUT]
     stated = readout > 0.0 and READOUT not in named.full.names
     theta = _estimates(named.model, (*declared, *named.effects))
@@ -199,7 +198,7 @@ def diagnose_camera(
     full = keep("everything", lambda: selection.fit_everything(views, names, fixed, learn_scatter=unknown))
     notes = keep("match", lambda: selection.check_match(log.name, full, grey=gathered.grey))
     report("looking for what the camera lacks")
-    own = [effect for effect in declared if effect in effects_of(tuple(names))]
+    own = [effect for effect in declared if effect in effects_of(names)]
     named = keep("named", lambda: selection.select_camera_effects(full, own))
     report("testing on frames kept aside")
     weighed = keep("weighed", lambda: error.weigh_effects(named, seed))

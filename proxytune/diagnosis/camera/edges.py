@@ -6,7 +6,7 @@ pictures of the log's own size; `Tape` orders the errors with which the map's li
 and puts all of it together.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -168,11 +168,11 @@ def _samples(rate_hz: float) -> int:
 
 
 def _within_poses(times: Floats, known: Floats, still: bool) -> Flags:
-    after = np.searchsorted(known, times)
-    gap = known[np.clip(after, 0, len(known) - 1)] - known[np.clip(after - 1, 0, len(known) - 1)]
+    place = np.searchsorted(known, times)
+    before, after = (known[np.clip(one, 0, len(known) - 1)] for one in (place - 1, place))
     inside = (times >= known[0]) & (times <= known[-1])
-    exact = np.isclose(known[np.clip(after, 0, len(known) - 1)], times, atol=1e-6)
-    return np.asarray(exact if still else inside & (exact | (gap <= LONGEST_GAP_S)))
+    exact = np.isclose(after, times, atol=1e-6)
+    return np.asarray(exact if still else inside & (exact | (after - before <= LONGEST_GAP_S)))
 
 
 LATENCY = "camera_latency"
@@ -234,9 +234,9 @@ class Optics:
         return RULES.at_end(value, (parameter.low, parameter.high), self.neutral(name))
 
 
-def effects_of(names: tuple[str, ...]) -> tuple[str, ...]:
+def effects_of(names: Iterable[str]) -> tuple[str, ...]:
     """The effects that parameters belong to, each once."""
-    return tuple(dict.fromkeys(effect_of(name) for name in names))
+    return tuple(dict.fromkeys(map(effect_of, names)))
 
 
 LEAST_SCATTER = (0.0005, np.radians(0.1))
@@ -273,9 +273,14 @@ class Views:
         return np.array((place, place, turn))
 
     @property
+    def tape(self) -> "Tape":
+        """The order of the tape's errors."""
+        return Tape(self.markings.stretches)
+
+    @property
     def tape_scatter(self) -> Floats:
         """Standard deviations of the tape's errors, in the order of `Tape` [m]."""
-        return np.full(Tape(self.markings.stretches).size, max(self.tape_m, LEAST_TAPE_M))
+        return np.full(self.tape.size, max(self.tape_m, LEAST_TAPE_M))
 
 
 @dataclass(frozen=True)

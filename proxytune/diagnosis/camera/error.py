@@ -173,7 +173,7 @@ def compare_brightness(
     """
     out = np.arange(named.full.views.count) % FOLDS == 0
     plain, full = looks
-    added = [effect for effect in effects_of(tuple(full)) if effect not in effects_of(tuple(plain))]
+    added = [effect for effect in effects_of(full) if effect not in effects_of(plain)]
     without = [{name: value for name, value in full.items() if effect_of(name) != effect} for effect in added]
     before = _grey_errors(gathered, named.declared, [plain], out, seed)[0]
     after, *others = _grey_errors(gathered, named.model, [full, *without], out, seed)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from proxytune.arrays import Flags, Floats
 from proxytune.diagnosis.camera import model
-from proxytune.diagnosis.camera.edges import MAP_SCATTER, Tape, Views
+from proxytune.diagnosis.camera.edges import MAP_SCATTER, Views
 
 EVIDENCE = 0.1
 """Edge points of a picture are not independent: so much of a point's evidence counts."""
@@ -161,7 +161,7 @@ def fit_camera(
 def common_slopes(views: Views, state: model.State, there: model.Projection, names: tuple[str, ...]) -> Floats:
     """Slopes of the residuals by camera, map and tape (n, names + 3 + tape)."""
     first = len(names) + 3
-    columns = np.zeros((len(there.residual), first + Tape(views.markings.stretches).size))
+    columns = np.zeros((len(there.residual), first + views.tape.size))
     columns[:, : len(names)] = model.camera_slopes(views, state, there, names)
     columns[:, len(names) : first] = model.map_slopes(views, state, there)
     rows = np.arange(len(columns))

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from proxytune.arrays import Flags, Floats
-from proxytune.diagnosis.camera.edges import LATENCY, READOUT, Tape, Views
+from proxytune.diagnosis.camera.edges import LATENCY, READOUT, Views
 from proxytune.driving import LINES, CameraFigures, GroundPlaneCamera, Marks, draw_floor, floor_points
 from proxytune.effects import FilterContext, Stage, effects_from, stage_chain
 
@@ -52,7 +52,7 @@ class Projection(NamedTuple):
 
 def neutral_state(views: Views, theta: Mapping[str, float]) -> State:
     """Tape, map and poses as they are said to be."""
-    return State(theta, np.zeros(Tape(views.markings.stretches).size), np.zeros(3), np.zeros((views.count, 3)))
+    return State(theta, np.zeros(views.tape.size), np.zeros(3), np.zeros((views.count, 3)))
 
 
 def project(views: Views, state: State) -> Projection:
@@ -74,7 +74,7 @@ def project(views: Views, state: State) -> Projection:
     near = on_floor & (reach < FARTHEST_M) & wide
     outward = _turned(marks.slope, state.offset[2])
     aligned = -(outward * across).sum(axis=1) / metres > ALIGNED
-    tape = Tape(views.markings.stretches)
+    tape = views.tape
     shift = state.tape[tape.shift(marks.stretch, marks.line)]
     shift = shift + state.tape[tape.tilt(marks.stretch, marks.line)] * _askew(marks)
     shift = marks.side * shift - 0.5 * state.tape[tape.width(edges.white, marks.line)]
@@ -116,12 +116,12 @@ def map_slopes(views: Views, state: State, there: Projection) -> Floats:
 
 def tape_slopes(views: Views, there: Projection) -> tuple[tuple[NDArray[np.intp], Floats], ...]:
     """Slopes by the tape: places in the row of `Tape` and slopes (n,), for shift, tilt and width."""
-    tape, marks, white = Tape(views.markings.stretches), there.marks, views.edges.white
+    tape, marks = views.tape, there.marks
     across = marks.side / there.metres
     return (
         (tape.shift(marks.stretch, marks.line), across),
         (tape.tilt(marks.stretch, marks.line), across * _askew(marks)),
-        (tape.width(white, marks.line), -0.5 / there.metres),
+        (tape.width(views.edges.white, marks.line), -0.5 / there.metres),
     )
 
 

@@ -11,7 +11,6 @@ poses and map belong together at all; `hidden_effects` and `next_views` what the
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
-from types import MappingProxyType
 
 import numpy as np
 
@@ -50,11 +49,7 @@ class Subset:
 
 
 def rank_subsets(full: CameraFit, declared: Sequence[str], size: int) -> list[Subset]:
-    """Sets of so many effects besides those declared, the best first.
-
-    The loss is the quadratic form about the fit with everything free: exact where the camera is near its neutral
-    values, and cheap enough for every set.
-    """
+    """Sets of so many effects besides those declared, the best first, by the quadratic form about the full fit."""
     others = [effect for effect in effects_of(full.names) if effect not in declared]
     off = np.array([full.theta[name] - full.views.optics.neutral(name) for name in full.names])
     sets = []
@@ -288,21 +283,21 @@ def _posed(change: Callable[[Floats], Floats]) -> Callable[[Views], Views]:
     return lambda views: replace(views, tracks=replace(views.tracks, poses=change(views.tracks.poses)))
 
 
-MISTAKES: Mapping[str, Callable[[Views], Views]] = MappingProxyType(
-    {
-        "the pictures are mirrored": _mirrored(1.0),
-        "the pictures are upside down": _mirrored(-1.0),
-        "heading is clockwise": _posed(lambda poses: poses * (1.0, 1.0, -1.0)),
-        "headings are in degrees": _posed(lambda poses: poses * (1.0, 1.0, np.radians(1.0))),
-        "x and y are swapped": _posed(lambda poses: poses[:, (1, 0, 2)]),
-        "each frame belongs to the next row": _posed(lambda poses: np.roll(poses, -1, axis=0)),
-        "each frame belongs to the row before": _posed(lambda poses: np.roll(poses, 1, axis=0)),
-    }
-)
+MISTAKES: Mapping[str, Callable[[Views], Views]] = {
+    "the pictures are mirrored": _mirrored(1.0),
+    "the pictures are upside down": _mirrored(-1.0),
+    "heading is clockwise": _posed(lambda poses: poses * (1.0, 1.0, -1.0)),
+    "headings are in degrees": _posed(lambda poses: poses * (1.0, 1.0, np.radians(1.0))),
+    "x and y are swapped": _posed(lambda poses: poses[:, (1, 0, 2)]),
+    "each frame belongs to the next row": _posed(lambda poses: np.roll(poses, -1, axis=0)),
+    "each frame belongs to the row before": _posed(lambda poses: np.roll(poses, 1, axis=0)),
+}
 """Usual mistakes in logs, and what undoes each."""
-ALWAYS: Mapping[str, str] = MappingProxyType(
-    {"camera_yaw": "heading_offset", "camera_forward": "marker_offset", LATENCY: "clock offset"}
-)
+ALWAYS: Mapping[str, str] = {
+    "camera_yaw": "heading_offset",
+    "camera_forward": "marker_offset",
+    LATENCY: "clock offset",
+}
 """Effects of the tracker that frames cannot tell from one of the camera."""
 
 
@@ -320,7 +315,7 @@ def hidden_effects(full: CameraFit, model: Sequence[str]) -> tuple[str, ...]:
         away = (abs(probe - neutral) for probe in parameter.probes if probe != neutral)
         if 2.0 * sd > min(away, default=parameter.high):
             hidden.append(name)
-    return effects_of(tuple(hidden))
+    return effects_of(hidden)
 
 
 def next_views(hidden: Sequence[str], *, repeated: bool) -> tuple[str, ...]:

@@ -112,10 +112,10 @@ def read_clocks(log: Log, robot: Robot, like: Clocks | None = None, model: Theta
     log, drift, (squares, latencies, best, apart) = _read_drift(log, robot, drives, speeds, model)
     kept, jumps, common, others = _single_clocks(log, squares, latencies)
     if model is not None and (jumps or others):
-        beside = _squares_by_model(log, robot, speeds, latencies, model, float(best.squares.mean()))
+        beside = _squares_by_model(log, robot, speeds, latencies, model, best.misfit)
         if beside is not None:
             kept, jumps, common, others = _single_clocks(log, beside, latencies)
-    own = [squares.squares[latency.blocks_within(squares, e, kept[e])] for e in range(len(log.episodes))]
+    own = latency.squares_within(squares, kept)
     alike = np.concatenate([part for e, part in enumerate(own) if e not in others])
     usual = latency.likeliest_latency(alike, latencies)
     assumed = like.left_s if like else max(robot.theta.get("delay", 0.0), ASSUMED_DELAY_S)
@@ -166,7 +166,7 @@ def _read_drift(
         found = _squares_by_reaction(corrected, gather(corrected, robot, corrected.episodes), speeds)
     if model is not None and drift.value:
         _, latencies, best, _ = given
-        beside = _squares_by_model(log, robot, speeds, latencies, model, float(best.squares.mean()))
+        beside = _squares_by_model(log, robot, speeds, latencies, model, best.misfit)
         if beside is not None and not ((more := drift_of(beside, latencies)) and more.is_sure):
             return log, NONE, given
     return corrected, drift, found
@@ -183,8 +183,7 @@ def put_on_one_clock(log: Log, clocks: Clocks) -> Log:
         begin, end = episode.times[0] + np.maximum(kept_s, (-later_s, 0.0)) + (-1e-9, 1e-9)
         known, measured = (begin <= episode.times) & (episode.times <= end), episode.measured
         if measured is not None:
-            own = known[measured.rows]
-            measured = Measured(measured.times[own], measured.poses[own], measured.rows[own])
+            measured = Measured(*(part[known[measured.rows]] for part in measured))
         return replace(episode, poses=np.where(known[:, None], episode.poses, np.nan), measured=measured)
 
     episodes = without_drift(log, clocks.drift.value).episodes
@@ -218,8 +217,7 @@ def _single_clocks(
         varied = len({jump.drive for jump in jumps} - {jump.drive for jump in at_steps}) > most
         kept, jumps = (proven, at_steps) if varied else (kept, jumps)
     jumped = {jump.drive for jump in jumps}
-    own = [squares.squares[latency.blocks_within(squares, e, kept[e])] for e in range(len(log.episodes))]
-    common, others = latency.deviants(own, latencies)
+    common, others = latency.deviants(latency.squares_within(squares, kept), latencies)
     whole = [e for e in others if log.episodes[e].name not in jumped]
     if varied or len(whole) > most:
         others = {e: one for e, one in others.items() if e not in whole}

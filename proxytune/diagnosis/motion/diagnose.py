@@ -134,7 +134,7 @@ def horizon_error(
     """
     drives, rules = tested.drives, tested.drives.rules
     windows = prediction.cut(drives, horizon_s)
-    if len(np.unique(drives.block[windows.begin])) < rules.fewest_blocks:
+    if prediction.count_blocks(drives, windows) < rules.fewest_blocks:
         return None
     blocks = prediction.blocks_of(drives, windows)
     before = how(drives, found.declared.theta, windows) ** 2
@@ -151,7 +151,7 @@ def horizon_error(
         windows=len(windows.begin),
         before=prediction.rmse(before[:, 0], blocks),
         after=prediction.rmse(after[:, 0], blocks),
-        ratio=prediction.ratio(after[:, 0], before[:, 0], blocks, rules.ratio_p_value),
+        ratio=prediction.ratio_over(drives, windows, after[:, 0], before[:, 0]),
         floor=bracket(lower, reached, prediction.compare_repeats(tested.whole, found.model.theta, horizon_s), rules),
         heading_before=prediction.rmse(before[:, 1], blocks),
         heading_after=prediction.rmse(after[:, 1], blocks),

@@ -22,7 +22,7 @@ from proxytune.diagnosis.motion.curve_offer import CORRELATED, offer_curves, pri
 from proxytune.diagnosis.motion.curve_selection import MODEL, ChosenGroups, Sums, choose_groups, sum_squares
 from proxytune.diagnosis.motion.drives import Drives, Floats
 from proxytune.diagnosis.motion.evidence import Findings
-from proxytune.diagnosis.motion.innovations import Coordinate, smooth_coordinates, spans, theta_at
+from proxytune.diagnosis.motion.innovations import Coordinate, smooth_coordinates, spans, theta_at, values_at
 from proxytune.diagnosis.motion.multistep_fit import HORIZONS_S, PoseNoise, noise_floor, pose_noise
 from proxytune.diagnosis.motion.prediction import (
     FITTED_S,
@@ -30,12 +30,14 @@ from proxytune.diagnosis.motion.prediction import (
     Rmse,
     Windows,
     blocks_of,
+    count_blocks,
     cut,
     pose_errors,
-    ratio,
+    ratio_over,
     rmse,
     select_windows,
     slopes_of,
+    squared_distances,
 )
 from proxytune.diagnosis.motion.screening import Candidate, candidates
 from proxytune.effects import (
@@ -62,21 +64,14 @@ FARTHEST = 0.15
 
 @dataclass(frozen=True)
 class Discrepancy:
-    """The discrepancy of a model, as curves were fitted to it.
+    """The discrepancy of a model, as curves were fitted to it."""
 
-    Attributes:
-        theta: Its values by their names in θ, with those of the model's own that moved along; empty where no group
-            pays.
-        share: The share of each chosen group, by its title, in what is gained on blocks that are left out.
-        guard: By horizon, the error with it over that without, each block predicted by a fit to others.
-        used: Whether the guard lets it in.
-        held_out: Squared distance at the poses of windows of FITTED_S, predicted by fits to other blocks (M,) [m²].
-    """
-
+    # its values by name in θ, with those of the model's own that moved along; empty where no group pays
     theta: Mapping[str, float] = field(default_factory=dict)
-    share: Mapping[str, float] = field(default_factory=dict)
-    guard: Mapping[float, Ratio] = field(default_factory=dict)
-    used: bool = False
+    share: Mapping[str, float] = field(default_factory=dict)  # of each chosen group, by title, in the held-out gain
+    guard: Mapping[float, Ratio] = field(default_factory=dict)  # held-out error with it over that without, by horizon
+    used: bool = False  # whether the guard lets it in
+    # squared distance at the poses of windows of FITTED_S, predicted by fits to other blocks (M,) [m²]
     held_out: Floats = field(default_factory=lambda: np.empty(0))
 
 
@@ -102,9 +97,8 @@ class _Task(NamedTuple):
         """Tell whether held-out squares are clearly less than the rival's."""
         if self.rival is None:
             return True
-        rules, blocks = self.drives.rules, blocks_of(self.drives, self.windows)
-        compared = ratio(squares, self.rival, blocks, rules.ratio_p_value)
-        return compared.value < rules.doubtful_names and compared.below
+        compared = ratio_over(self.drives, self.windows, squares, self.rival)
+        return compared.value < self.drives.rules.doubtful_names and compared.below
 
     def without(self, left_out: Iterable[str], *, moves: bool) -> "_Task":
         """The same without the curves of some groups, and the model's own values as they are unless these move."""
@@ -127,8 +121,8 @@ def fit_discrepancy(
     Curves that are not clearly better than a rival, by its held-out squares (M,), are neither guarded nor used.
     """
     windows = cut(drives, FITTED_S)
-    blocks = len(np.unique(drives.block[windows.begin]))
-    before = pose_errors(drives, theta, windows)[:, 0] ** 2 if blocks else np.empty(0)
+    blocks = count_blocks(drives, windows)
+    before = squared_distances(drives, theta, windows) if blocks else np.empty(0)
     if blocks < drives.rules.discrepancy_blocks or not _has_room(drives, theta):
         return Discrepancy(held_out=before)
     offer, moving = offer_curves(drives, theta), smooth_coordinates(free, drives.robot)
@@ -145,10 +139,8 @@ def fit_discrepancy(
         found = _fitted(task, patient=True)
     # Curves over motion were linearised without those over commands, and may get in each other's way.
     if _has(found, COMMAND_GROUPS):
-        alone, of = _fitted(task, COMMAND_GROUPS), blocks_of(drives, windows)
-        if alone.used and not (
-            found.used and ratio(found.held_out, alone.held_out, of, drives.rules.ratio_p_value).below
-        ):
+        alone = _fitted(task, COMMAND_GROUPS)
+        if alone.used and not (found.used and ratio_over(drives, windows, found.held_out, alone.held_out).below):
             found = alone
     return found
 
@@ -157,7 +149,7 @@ def _has_room(drives: Drives, theta: Theta) -> bool:
     """Tell whether there is more error than the noise of measured poses, which is left in any case."""
     noise, share = pose_noise(drives, theta), drives.rules.discrepancy_helps
     known = [windows for horizon_s in HORIZONS_S if len((windows := cut(drives, horizon_s)).begin)]
-    return not all(_is_noise(drives, noise, one, pose_errors(drives, theta, one)[:, 0] ** 2, share) for one in known)
+    return not all(_is_noise(drives, noise, one, squared_distances(drives, theta, one), share) for one in known)
 
 
 def _is_noise(drives: Drives, noise: PoseNoise, windows: Windows, squares: Floats, share: float) -> bool:
@@ -228,7 +220,7 @@ def _fit_curves(task: _Task, patient: bool) -> tuple[Theta, Mapping[str, float],
         """The chosen curves, and the moving coordinates a step further."""
         if not chosen.gains:
             return {}
-        here = np.array([{**task.theta, **now}[coordinate[0]] for coordinate in moving])
+        here = values_at({**task.theta, **now}, moving)
         step = np.clip(chosen.weights[own], -FARTHEST, FARTHEST) * (high - low)
         return {**theta_at({}, moving, np.clip(here + step, low, high)), **_theta(offer, chosen)}
 
@@ -274,13 +266,12 @@ def _guard(
     found = {}
     for horizon_s in HORIZONS_S:
         windows = cut(drives, horizon_s)
-        blocks = blocks_of(drives, windows)
-        if len(np.unique(blocks)) >= drives.rules.discrepancy_blocks:
+        if count_blocks(drives, windows) >= drives.rules.discrepancy_blocks:
             before, after = known.get(horizon_s) or (
-                pose_errors(drives, theta, windows)[:, 0] ** 2,
+                squared_distances(drives, theta, windows),
                 _cross_validate(drives, theta, folds, windows),
             )
-            found[horizon_s] = ratio(after, before, blocks, drives.rules.ratio_p_value)
+            found[horizon_s] = ratio_over(drives, windows, after, before)
     return found
 
 
@@ -292,7 +283,7 @@ def _cross_validate(drives: Drives, theta: Theta, folds: Sequence[Theta], window
         own = fold_of == number
         if own.any():
             part = select_windows(windows, own)
-            squares[own[windows.window]] = pose_errors(drives, {**theta, **fold}, part)[:, 0] ** 2
+            squares[own[windows.window]] = squared_distances(drives, {**theta, **fold}, part)
     return squares
 
 
@@ -328,10 +319,10 @@ def match_named_effect(
 
     def loss(candidate: Candidate, values: Floats) -> float:
         low, high = spans(candidate.free, drives)
-        moved = theta_at({**theta, **candidate.fixed}, candidate.free, np.clip(values, low, high))
-        return float(np.mean(pose_errors(drives, moved, windows)[:, 0] ** 2))
+        moved = candidate.theta_at(theta, np.clip(values, low, high))
+        return float(squared_distances(drives, moved, windows).mean())
 
-    plain = float(np.mean(pose_errors(drives, theta, windows)[:, 0] ** 2))
+    plain = float(squared_distances(drives, theta, windows).mean())
     gained = plain - float(discrepancy.held_out.mean())
     if gained <= 0.0:
         return None
@@ -340,7 +331,7 @@ def match_named_effect(
     tuned = [_tune(forms[number], np.array(probe), loss, drives) for _, number, probe in sorted(probed)[:PROMISING]]
     least, form, values = min(tuned, key=lambda found: found[0])
     share = (plain - least) / gained
-    found = theta_at(form.fixed, form.free, values)
+    found = form.theta_at({}, values)
     return MatchedEffect(form.effect, form.form, found, share) if share >= drives.rules.match_share else None
 
 
@@ -409,11 +400,10 @@ def learn(found: Findings, tested: Drives, horizons_s: Iterable[float]) -> Learn
 
 def _error(names: Theta, model: Theta, drives: Drives, horizon_s: float) -> LearntError | None:
     windows = cut(drives, horizon_s)
-    blocks = blocks_of(drives, windows)
-    if len(np.unique(blocks)) < drives.rules.fewest_blocks:
+    if count_blocks(drives, windows) < drives.rules.fewest_blocks:
         return None
     before, after = (pose_errors(drives, theta, windows) ** 2 for theta in (names, model))
-    compared = ratio(after[:, 0], before[:, 0], blocks, drives.rules.ratio_p_value)
+    compared, blocks = ratio_over(drives, windows, after[:, 0], before[:, 0]), blocks_of(drives, windows)
     return LearntError(horizon_s, rmse(after[:, 0], blocks), rmse(after[:, 1], blocks), compared)
 
 

@@ -162,8 +162,7 @@ def invisible_effects(model: Fit, taken: set[str]) -> tuple[str, ...]:
     for form in (form for form in forms if not form.form or form.effect not in plain):
         nats = 0.0
         if form.probes:
-            middle = np.array(form.probes[len(form.probes) // 2])
-            moved = innovations.theta_at({**model.theta, **form.fixed}, form.free, middle)
+            moved = form.theta_at(model.theta, form.middle_probe)
             change = innovations.increments(model.drives, model.theta) - innovations.increments(model.drives, moved)
             column = model.whiten.whiten(change)[:, None]
             direction = project_out(model.slopes, column, np.ones(len(column)))[:, 0]

@@ -17,7 +17,7 @@ import numpy as np
 
 from proxytune.diagnosis.answer import Rules
 from proxytune.diagnosis.motion.fitting import Fit, fit, held_out_log_likelihood, loss_of
-from proxytune.diagnosis.motion.innovations import RANDOM_EFFECTS, Coordinate, lateness, spans, theta_at
+from proxytune.diagnosis.motion.innovations import RANDOM_EFFECTS, Coordinate, lateness, spans
 from proxytune.diagnosis.motion.random_effects import RandomEffect, random_effects
 from proxytune.diagnosis.motion.screening import Candidate, ScreenedCandidate, candidates, screen
 from proxytune.diagnosis.motion.signals import SignalCurve, fit_curves
@@ -147,9 +147,8 @@ def _refit(
         form = one.candidate
         if form.label in done or not one.gain > least:
             continue
-        theta = {**model.theta, **form.fixed}
         low, high = spans(form.free, model.drives)
-        starts = [theta_at(theta, form.free, np.clip(np.array(values), low, high)) for values in (one.start, one.probe)]
+        starts = [form.theta_at(model.theta, np.clip(values, low, high)) for values in (one.start, one.probe)]
         start = min(starts, key=lambda start: loss_of(model.drives, start, model.whiten))
         fitted = fit(model.drives, start, model.free + form.free, model.noise)
         fits[form.label] = FittedCandidate(float(held_out_log_likelihood(fitted).sum()) - plain, fitted, one)

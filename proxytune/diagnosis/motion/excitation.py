@@ -30,7 +30,7 @@ from proxytune.arrays import NORMAL_95
 from proxytune.diagnosis.motion.drives import Drives, Floats
 from proxytune.diagnosis.motion.evidence import AdoptedEffect, Findings, Variant
 from proxytune.diagnosis.motion.fitting import Fit, fit_theta, intervals, loss_of, slopes
-from proxytune.diagnosis.motion.innovations import increments, paths, span, theta_at, whitener
+from proxytune.diagnosis.motion.innovations import increments, paths, span, whitener
 from proxytune.diagnosis.motion.manoeuvres import LIBRARY, commands_of, mirrored
 from proxytune.diagnosis.motion.screening import Candidate, candidates
 from proxytune.space import Theta
@@ -226,9 +226,9 @@ class Rivals:
     def _first_fit(self, rival: Candidate, batch: Drives) -> Variant:
         """Fit a rival to what the effect does on imagined drives, from the best of the rival's probes."""
         model, effect = self._model, self._effect
-        theta = {**{key: value for key, value in model.theta.items() if key not in effect.names}, **rival.fixed}
+        theta = {name: value for name, value in model.theta.items() if name not in effect.names}
         free = tuple(coordinate for coordinate in model.free if coordinate not in effect.free) + rival.free
-        starts = [theta_at(theta, rival.free, np.array(probe)) for probe in rival.probes or ((),)]
+        starts = [rival.theta_at(theta, probe) for probe in rival.probes or ((),)]
         whiten = whitener(batch, model.noise)
         best = min(starts, key=lambda start: loss_of(batch, start, whiten))
         return self._refit(batch, Variant(best, free))
@@ -270,8 +270,7 @@ class Unknown:
         whiten, here = whitener(batch, model.noise), increments(batch, model.theta)
         columns = [slopes(batch, model.theta, model.free, whiten) * self._deviations]
         for form in self._forms:
-            probe = np.array(form.probes[len(form.probes) // 2])
-            moved = theta_at({**model.theta, **form.fixed}, form.free, probe)
+            moved = form.theta_at(model.theta, form.middle_probe)
             columns.append(whiten.whiten(here - increments(batch, moved))[:, None])
         together = np.concatenate(columns, axis=1).reshape(count, -1, len(self._deviations) + len(self._forms))
         gram = np.swapaxes(together, 1, 2) @ together * 60.0 / self._course.seconds

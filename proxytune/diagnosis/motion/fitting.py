@@ -35,6 +35,7 @@ from proxytune.diagnosis.motion.innovations import (
     span,
     spans,
     theta_at,
+    values_at,
     whitener,
 )
 from proxytune.diagnosis.motion.prediction import jackknife_half_width
@@ -101,8 +102,7 @@ def _fit_sloped(drives: Drives, theta: Theta, free: tuple[Coordinate, ...], whit
     def jacobian(fractions: Floats) -> Floats:
         return slopes(drives, theta_at(theta, free, low + fractions * (high - low)), free, whiten)
 
-    start = (np.array([theta[coordinate[0]] for coordinate in free]) - low) / (high - low)
-    start = np.clip(start, 1e-6, 1.0 - 1e-6)
+    start = np.clip((values_at(theta, free) - low) / (high - low), 1e-6, 1.0 - 1e-6)
     found = least_squares(residuals, start, jacobian, (0.0, 1.0), loss="huber", f_scale=HUBER, ftol=1e-7, max_nfev=30)
     return theta_at(theta, free, low + np.clip(found.x, 0.0, 1.0) * (high - low))
 
@@ -115,8 +115,8 @@ def _scan(drives: Drives, theta: Theta, rough: tuple[Coordinate, ...], whiten: W
         # People set thresholds and steps to round numbers, and a duty just on one goes the other way a hair beside it.
         round_numbers = [float(f"{here:.{figures}g}") for figures in (1, 2, 3)]
         values = np.clip(np.concatenate((round_numbers, [here], here * multiples)), low, high)
-        losses = [loss_of(drives, theta_at(theta, (coordinate,), np.array([value])), whiten) for value in values]
-        theta = theta_at(theta, (coordinate,), values[[int(np.argmin(losses))]])
+        losses = [loss_of(drives, theta_at(theta, (coordinate,), (value,)), whiten) for value in values]
+        theta = theta_at(theta, (coordinate,), (values[np.argmin(losses)],))
     return theta
 
 
@@ -194,7 +194,7 @@ def _stepwise_interval(fitted: Fit, coordinate: Coordinate) -> tuple[float, floa
     here = fitted.theta[coordinate[0]]
     values = np.unique(np.clip(here * np.concatenate(([1.0], *LOOKS)), low, high))
     drives = fitted.drives
-    thetas = (theta_at(fitted.theta, (coordinate,), np.array([value])) for value in values)
+    thetas = (theta_at(fitted.theta, (coordinate,), (value,)) for value in values)
     left = (fitted.whiten.whiten(drives.measured - increments(drives, theta)) for theta in thetas)
     losses = np.stack([sum_by_block(drives, huber(innovations)) for innovations in left], axis=1)
     best = values[(losses.sum(axis=0) - losses).argmin(axis=1)]

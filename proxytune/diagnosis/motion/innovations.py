@@ -463,7 +463,12 @@ def spans(free: Sequence[Coordinate], drives: Drives) -> Floats:
     return np.reshape([span(coordinate, drives) for coordinate in free], (-1, 2)).T
 
 
-def theta_at(theta: Theta, free: Sequence[Coordinate], values: Floats) -> dict[str, float]:
+def values_at(theta: Theta, free: Sequence[Coordinate]) -> Floats:
+    """The values that θ has of free coordinates (coordinates,)."""
+    return np.array([theta[name] for name, *_ in free])
+
+
+def theta_at(theta: Theta, free: Sequence[Coordinate], values: Sequence[float] | Floats) -> dict[str, float]:
     """θ with its free coordinates at these values."""
     given = {name: float(value) for names, value in zip(free, values, strict=True) for name in names}
     return {**theta, **given}
@@ -473,7 +478,7 @@ def nudged(drives: Drives, theta: Theta, coordinate: Coordinate, share: float) -
     """θ with a coordinate moved by a share of its range, and that share: downwards where the range ends."""
     here, (low, high) = theta[coordinate[0]], span(coordinate, drives)
     step = share if here + share * (high - low) <= high else -share
-    return theta_at(theta, (coordinate,), np.array([here + step * (high - low)])), step
+    return theta_at(theta, (coordinate,), (here + step * (high - low),)), step
 
 
 def at_edge(name: str, value: float, drives: Drives) -> bool:

@@ -59,6 +59,11 @@ class Reaction(NamedTuple):
     gains: Floats  # from commanded to measured forward speed and yaw rate (2, 2)
     squares: Floats  # what it leaves of each span (M,), in units of the whole log's
 
+    @property
+    def misfit(self) -> float:
+        """Mean square that it leaves of the speeds, as a share of their variances."""
+        return float(self.squares.mean())
+
 
 class Latency(NamedTuple):
     """A pure latency [s] with its standard deviation."""
@@ -92,7 +97,7 @@ def reaction(drives: Drives, speeds: Speeds, reach_s: float) -> Reaction:
     few = Speeds(*(part[::THINNED] for part in speeds))
     latencies = np.arange(-reach_s, reach_s + 1e-9, ROUGH_STEP_S).tolist()
     looks = [look for constant in TIME_CONSTANTS_S for look in commanded.reactions(few, latencies, (constant, 0.0))]
-    _, latency, (constant, _) = min((_misfit(look), look.latency_s, look.lags_s) for look in looks)
+    _, latency, (constant, _) = min((look.misfit, look.latency_s, look.lags_s) for look in looks)
     return _close_reaction(commanded, speeds, (latency, float(np.sqrt(constant)), 0.0), (-reach_s, reach_s))
 
 
@@ -112,16 +117,17 @@ def _close_reaction(
 
     def at(point: Floats) -> Reaction:
         motors, turns = np.minimum(np.append(point[1:], 0.0)[:2] ** 2, LONGEST_LAG_S).tolist()
-        return commanded.reaction(speeds, float(np.clip(point[0], *reach_s)), (motors, turns))
+        (found,) = commanded.reactions(speeds, [float(np.clip(point[0], *reach_s))], (motors, turns))
+        return found
 
     def search(count: int) -> Reaction:
         simplex = (start + np.eye(4, 3, -1) * SIMPLEX)[: count + 1, :count]
         options: Any = {"xatol": 2e-3, "fatol": 1e-5, "maxfev": 30 * count, "initial_simplex": simplex}
-        found: Any = minimize(lambda point, *_: _misfit(at(point)), simplex[0], method="Nelder-Mead", options=options)
+        found: Any = minimize(lambda point, *_: at(point).misfit, simplex[0], method="Nelder-Mead", options=options)
         return at(found.x)
 
     plain, late = search(2), search(3)
-    return late if _misfit(late) < TURNS_LATE * _misfit(plain) else plain
+    return late if late.misfit < TURNS_LATE * plain.misfit else plain
 
 
 class _CommandedSpeeds:
@@ -175,16 +181,6 @@ class _CommandedSpeeds:
             squares = ((rest / size) ** 2).sum(axis=1)
             found.append(Reaction(latency_s, lags_s, gains, squares))
         return found
-
-    def reaction(self, speeds: Speeds, latency_s: float, lags_s: tuple[float, float]) -> Reaction:
-        """The reaction with the best gains at one latency."""
-        (found,) = self.reactions(speeds, (latency_s,), lags_s)
-        return found
-
-
-def _misfit(found: Reaction) -> float:
-    """Mean square that a reaction leaves of the speeds, as a share of their variances."""
-    return float(found.squares.mean())
 
 
 def _moved(gone: Floats, ends: Ends, late: float) -> Floats:
@@ -353,10 +349,11 @@ class Jump(NamedTuple):
     by_s: float
 
 
-def blocks_within(blocks: Blocks, episode: int, kept: tuple[float, float]) -> Whole:
-    """The blocks of an episode that lie in a stretch [s]."""
+def squares_within(blocks: Blocks, kept: Sequence[tuple[float, float]]) -> list[Floats]:
+    """The squares of each episode's blocks that lie in its stretch [s]."""
     begin, end = blocks.number * LATENCY_BLOCK_S, (blocks.number + 1) * LATENCY_BLOCK_S
-    return np.flatnonzero((blocks.episode == episode) & (begin >= kept[0]) & (end <= kept[1]))
+    within = [(blocks.episode == e) & (begin >= first) & (end <= last) for e, (first, last) in enumerate(kept)]
+    return [blocks.squares[own] for own in within]
 
 
 class Step(NamedTuple):

@@ -24,18 +24,20 @@ from proxytune.diagnosis.motion.innovations import (
     theta_at,
     tracked,
     twists_of,
+    values_at,
 )
 from proxytune.diagnosis.motion.prediction import (
     Ratio,
     Windows,
     blocks_of,
+    count_blocks,
     cut,
     measured_motion,
-    pose_errors,
     pose_errors_along,
     predicted_motion,
-    ratio,
+    ratio_over,
     select_windows,
+    squared_distances,
 )
 from proxytune.driving import BulletPlant, has_pybullet
 from proxytune.space import Theta
@@ -63,9 +65,7 @@ class MultistepFit(NamedTuple):
 
 def horizons(drives: Drives) -> tuple[float, ...]:
     """List the horizons of which these drives have windows in enough blocks."""
-    return tuple(
-        h for h in HORIZONS_S if len(np.unique(drives.block[cut(drives, h).begin])) >= drives.rules.fewest_blocks
-    )
+    return tuple(h for h in HORIZONS_S if count_blocks(drives, cut(drives, h)) >= drives.rules.fewest_blocks)
 
 
 def fit_windows(drives: Drives, theta: Theta, free: Sequence[Coordinate], windows: Windows) -> dict[str, float]:
@@ -130,7 +130,7 @@ def _problem(drives: Drives, theta: Theta, free: tuple[Coordinate, ...], windows
             columns.append((residuals(moved) - here) / step)
         return np.stack(columns, axis=1)
 
-    start = np.clip((np.array([theta[coordinate[0]] for coordinate in free]) - low) / (high - low), 1e-6, 1.0 - 1e-6)
+    start = np.clip((values_at(theta, free) - low) / (high - low), 1e-6, 1.0 - 1e-6)
     return _Problem(at, residuals, jacobian, start, max(1e-6, ROBUST * float(np.median(np.abs(residuals(start))))))
 
 
@@ -145,19 +145,18 @@ def held_out_squares(drives: Drives, theta: Theta, free: Sequence[Coordinate], f
         for horizon, one in asked.items():
             here = fold[one.begin] == own
             if here.any():
-                found[horizon][here[one.window]] = pose_errors(drives, values, select_windows(one, here))[:, 0] ** 2
+                found[horizon][here[one.window]] = squared_distances(drives, values, select_windows(one, here))
     return found
 
 
 def compare_errors(drives: Drives, one: Mapping[float, Floats], other: Mapping[float, Floats]) -> dict[float, Ratio]:
     """Divide two errors over the same windows, by horizon [s]."""
-    shown_at = drives.rules.ratio_p_value
-    return {h: ratio(squares, other[h], blocks_of(drives, cut(drives, h)), shown_at) for h, squares in one.items()}
+    return {h: ratio_over(drives, cut(drives, h), squares, other[h]) for h, squares in one.items()}
 
 
 def squared_errors(drives: Drives, theta: Theta) -> dict[float, Floats]:
     """Squared distances of a model's poses from measured ones [m²], by horizon [s]."""
-    return {h: pose_errors(drives, theta, cut(drives, h))[:, 0] ** 2 for h in horizons(drives)}
+    return {h: squared_distances(drives, theta, cut(drives, h)) for h in horizons(drives)}
 
 
 def fit_multistep(fitted: Fit) -> tuple[Fit, MultistepFit | None]:

@@ -73,6 +73,11 @@ def blocks_of(drives: Drives, windows: Windows) -> Whole:
     return np.asarray(drives.block[windows.begin][windows.window])
 
 
+def count_blocks(drives: Drives, windows: Windows) -> int:
+    """Count the blocks that windows begin in."""
+    return len(np.unique(drives.block[windows.begin]))
+
+
 def predicted_motion(drives: Drives, theta: Theta, windows: Windows) -> Floats:
     """The model's motion since each window's beginning (M, 3): [m], [m], [rad]."""
     return np.concatenate(
@@ -115,6 +120,11 @@ def motion_in(drives: Drives, walked: Floats, windows: Windows, *, in_one_go: bo
 def pose_errors(drives: Drives, theta: Theta, windows: Windows) -> Floats:
     """Measure the errors of the model's poses (M, 2): distance [m], heading [rad]."""
     return _lengths(predicted_motion(drives, theta, windows) - measured_motion(drives, windows))
+
+
+def squared_distances(drives: Drives, theta: Theta, windows: Windows) -> Floats:
+    """Squared distances of the model's places from measured ones (M,) [m²]."""
+    return np.asarray(pose_errors(drives, theta, windows)[:, 0] ** 2)
 
 
 def pose_errors_along(drives: Drives, walked: Floats, windows: Windows) -> Floats:
@@ -169,6 +179,11 @@ def ratio(after: Floats, before: Floats, blocks: Whole, shown_at: float = RULES.
     half = jackknife_half_width(_log_means_without_each(after, blocks) - _log_means_without_each(before, blocks))
     value, interval = _root(float(np.log(after.mean() / before.mean())), half)
     return Ratio(value, interval, *_signed_ranks(after, before, blocks), shown_at)
+
+
+def ratio_over(drives: Drives, windows: Windows, after: Floats, before: Floats) -> Ratio:
+    """Divide the root mean squares of two errors over windows, shown to be off 1 by the rules of the drives."""
+    return ratio(after, before, blocks_of(drives, windows), drives.rules.ratio_p_value)
 
 
 def _signed_ranks(after: Floats, before: Floats, blocks: Whole) -> tuple[float, float]:
@@ -447,7 +462,7 @@ def compare_repeats(drives: Drives, theta: Theta, horizon_s: float) -> Repeated 
     if not apart[kept].any():
         # Copies of drives to the last digit: they say nothing of what a robot does not repeat.
         return None
-    missed = pose_errors(drives, theta, windows)[:, 0] ** 2
+    missed = squared_distances(drives, theta, windows)
     # Each drive of the log is one block: windows of repeats begin together.
     first = np.flatnonzero(np.diff(windows.window, prepend=-1))
     share = ratio(apart[kept], missed[kept], label[first][windows.window][kept])

@@ -61,6 +61,15 @@ class Candidate:
         """The name that people read: `dead_band (left wheel)`."""
         return f"{self.effect} ({self.form})" if self.form else self.effect
 
+    @property
+    def middle_probe(self) -> tuple[float, ...]:
+        """The probe in the middle, a usual size of the effect."""
+        return self.probes[len(self.probes) // 2]
+
+    def theta_at(self, theta: Theta, values: Sequence[float] | Floats) -> dict[str, float]:
+        """A model's θ with the effect in this form, its coordinates at these values."""
+        return theta_at({**theta, **self.fixed}, self.free, values)
+
 
 def candidates(robot: Robot, theta: Theta, taken: Iterable[str]) -> tuple[Candidate, ...]:
     """List every form of every deterministic motion effect that is not taken, from where θ has it."""
@@ -119,13 +128,9 @@ LARGEST_STEP = 1.5
 
 def with_dense_probes(base: Fit, forms: Sequence[Candidate]) -> list[Candidate]:
     """The forms, those of stepwise effects and of effects of a place with the best of many more probes."""
-    traces = base.drives.robot.catalogue
-    kinds = {form.effect: traces.effect(form.effect).trace for form in forms if not form.form}
-    dense = [
-        form
-        for form in forms
-        if not form.form and (trace := kinds[form.effect]) is not None and (trace.stepwise or trace.placed)
-    ]
+    catalogue = base.drives.robot.catalogue
+    plain = [(form, catalogue.effect(form.effect).trace) for form in forms if not form.form]
+    dense = [(form, trace) for form, trace in plain if trace and (trace.stepwise or trace.placed)]
     if not dense:
         return list(forms)
     part = evaluate(cut_part(base.drives), base.theta, base.free, base.noise)
@@ -133,9 +138,8 @@ def with_dense_probes(base: Fit, forms: Sequence[Candidate]) -> list[Candidate]:
     weight = (np.abs(part.innovations) < HUBER).astype(float)
     weighted = part.slopes * weight[:, None]
     answer = np.linalg.pinv(part.slopes.T @ weighted, hermitian=True) @ weighted.T
-    for form in dense:
-        trace = kinds[form.effect]
-        if trace is not None and trace.stepwise:
+    for form, trace in dense:
+        if trace.stepwise:
             high = span(form.free[0], part.drives)[1]
             sizes = np.geomspace(SMALLEST_SHARE * high, high, SIZES).tolist()
             offers = [(size, *form.neutral[1:]) for size in sizes]
@@ -143,7 +147,7 @@ def with_dense_probes(base: Fit, forms: Sequence[Candidate]) -> list[Candidate]:
             offers = _places(part.drives, form)
         gains = []
         for values in offers:
-            theta = theta_at({**part.theta, **form.fixed}, form.free, np.array(values))
+            theta = form.theta_at(part.theta, values)
             column = part.whiten.whiten(predicted - increments(part.drives, theta))
             column = column - part.slopes @ (answer @ column)
             gradient, hessian = float(column @ clip_outliers(part.innovations)), float(column**2 @ weight)
@@ -157,7 +161,7 @@ def _places(drives: Drives, form: Candidate) -> list[tuple[float, ...]]:
     """Patches round places that were driven through, their first coordinate at its middle probe."""
     found, often = np.unique(np.round(drives.poses[:, 0, :2] / CELL_M), axis=0, return_counts=True)
     places = found[np.argsort(-often, kind="stable")[:MOST_PLACES]] * CELL_M
-    size = form.probes[len(form.probes) // 2][0]
+    size = form.middle_probe[0]
     return [(size, x, y, radius) for (x, y), radius in product(places.tolist(), RADII_M)]
 
 
@@ -245,12 +249,11 @@ def screen(base: Fit, forms: Sequence[Candidate], seed: int) -> list[ScreenedCan
 
 
 def _probes(base: Fit, form: Candidate) -> list[_Probe]:
-    start = {**base.theta, **form.fixed}
     here = increments(base.drives, base.theta)
     found = []
     for values in form.probes:
         begin = _begin(form, values, base.drives.robot.catalogue.parameters)
-        moved = [theta_at(start, form.free, np.array((*begin[:j], v, *begin[j + 1 :]))) for j, v in enumerate(values)]
+        moved = [form.theta_at(base.theta, (*begin[:j], v, *begin[j + 1 :])) for j, v in enumerate(values)]
         columns = np.stack([here - increments(base.drives, theta) for theta in moved], -1)
         if np.abs(columns).max() > 1e-9:
             found.append((form, begin, values, base.whiten.whiten(columns)))

@@ -42,7 +42,7 @@ from proxytune.diagnosis.motion.evidence import (
 )
 from proxytune.diagnosis.motion.fitting import KEPT_SOLVABLE, Fit, derivatives_by_block, fit, held_out_log_likelihood
 from proxytune.diagnosis.motion.innovations import at_edge, huber, lateness, span, widened
-from proxytune.diagnosis.motion.prediction import Ratio, blocks_of, cut, pose_errors, ratio
+from proxytune.diagnosis.motion.prediction import Ratio, cut, ratio_over, squared_distances
 from proxytune.diagnosis.motion.random_effects import RandomEffect, infer_size_indirectly
 from proxytune.diagnosis.motion.screening import Candidate, ScreenedCandidate, candidates, screen
 from proxytune.diagnosis.motion.signals import SignalCurve, fit_curves
@@ -161,8 +161,7 @@ def eliminate(found: Findings, report: Progress, without: Collection[str] = ()) 
     sure = list[AdoptedEffect]()
     while doubtful := [effect for effect in effects if effect.free and effect not in sure]:
         effect = _weakest(model, doubtful)
-        rest = without_effect(Variant(model.theta, model.free), effect, base.drives.rate_hz)
-        smaller = fit(base.drives, rest.theta, rest.free, model.noise)
+        smaller = _fit_without(effect, model, base.drives)
         gain = _likelihood(model) - _likelihood(smaller)
         effects.remove(effect)
         if gain < rules.sure_gain_nats:
@@ -206,10 +205,9 @@ def drop_unconfirmed(
     """
     kept = list(adopted)
     for effect in sorted((one for one in adopted if one.free), key=lambda one: one.gain):
-        rules, rest = model.drives.rules, without_effect(Variant(model.theta, model.free), effect, model.drives.rate_hz)
-        without = fit(model.drives, rest.theta, rest.free, model.noise)
+        rules, without = model.drives.rules, _fit_without(effect, model, model.drives)
         others = taken | {one.effect for one in kept if one is not effect}
-        forms = [one for one in candidates(model.drives.robot, rest.theta, others) if one.effect == effect.effect]
+        forms = [one for one in candidates(model.drives.robot, without.theta, others) if one.effect == effect.effect]
         p_value = min((one.p_value for one in screen(without, forms, seed)), default=1.0)
         gain = _gain(model, without)
         place = kept.index(effect)
@@ -219,6 +217,12 @@ def drop_unconfirmed(
         else:
             kept[place] = replace(effect, p_value=p_value)
     return model, kept
+
+
+def _fit_without(effect: AdoptedEffect, model: Fit, drives: Drives) -> Fit:
+    """Fit all of a model but one of its effects again."""
+    rest = without_effect(Variant(model.theta, model.free), effect, drives.rate_hz)
+    return fit(drives, rest.theta, rest.free, model.noise)
 
 
 def _gain(one: Fit, other: Fit) -> float:
@@ -343,8 +347,8 @@ def _compare_predictions(one: Fit, other: Fit) -> Ratio | None:
     windows = cut(drives, drives.rules.guard_horizon_s)
     if len(windows.begin) < 2:
         return None
-    own, others = (pose_errors(fitted.drives, fitted.theta, windows)[:, 0] ** 2 for fitted in (one, other))
-    return ratio(own, others, blocks_of(drives, windows), drives.rules.ratio_p_value)
+    own, others = (squared_distances(fitted.drives, fitted.theta, windows) for fitted in (one, other))
+    return ratio_over(drives, windows, own, others)
 
 
 def adopt(adopted: list[AdoptedEffect], best: FittedCandidate, evidence: Evidence) -> list[AdoptedEffect]:
@@ -386,8 +390,7 @@ def drop_idle(model: Fit, adopted: Sequence[AdoptedEffect]) -> tuple[Fit, list[A
     # Random effects stay: they move no mean, so the likelihood of the mean cannot speak for them.
     for effect in adopted[:-1]:
         if effect.free and len(adopted) > 1:
-            rest = without_effect(Variant(model.theta, model.free), effect, model.drives.rate_hz)
-            without = fit(model.drives, rest.theta, rest.free, model.noise)
+            without = _fit_without(effect, model, model.drives)
             if _gain(model, without) < model.drives.rules.least_gain_nats:
                 return without, [other for other in adopted if other is not effect]
     return model, list(adopted)

@@ -33,6 +33,7 @@ from proxytune.diagnosis.motion.innovations import (
     spans,
     theta_at,
     twists_of,
+    values_at,
     wheel_speeds,
 )
 from proxytune.driving import drivetrain
@@ -68,8 +69,7 @@ class _Motion:
     """The motion that basis functions are made of, all (E, T)."""
 
     drives: Drives
-    left: Floats
-    right: Floats
+    sides: tuple[Floats, Floats]  # speeds of the left and the right wheel [m/s]
     forward: Floats
     yaw: Floats
     commands: Floats
@@ -96,10 +96,10 @@ def _motion(fitted: Fit) -> _Motion:
     if drives.robot.drive == "ackermann":
         forward, _, yaw = np.moveaxis(drivetrain(drives.robot, ()).ideal(wheels), -1, 0)
         turn = yaw * track_of(drives.robot.figures) / 2.0
-        return _Motion(drives, forward - turn, forward + turn, forward, yaw, commands)
+        return _Motion(drives, (forward - turn, forward + turn), forward, yaw, commands)
     left, right = np.moveaxis(wheels * figures["full_speed"], -1, 0)
     yaw = (right - left) / figures["effective_baseline"]
-    return _Motion(drives, left, right, (left + right) / 2.0, yaw, commands)
+    return _Motion(drives, (left, right), (left + right) / 2.0, yaw, commands)
 
 
 def hats(signal: Floats, knots: int = KNOTS) -> Floats:
@@ -135,9 +135,8 @@ def _side_by_side(parts: Sequence[Mapping[int, Floats]]) -> Floats:
 
 def _command_level(motion: _Motion) -> _Signal:
     full = motion.drives.robot.figures["full_speed"]
-    lagged = [side / full for side in (motion.left, motion.right)]
-    columns = [hats(side, 9) * full for side in lagged]
-    return Cue.WHEEL_COMMAND, lagged[0], "duty", _of_wheels(motion, *columns)
+    levels = [speed / full for speed in motion.sides]
+    return Cue.WHEEL_COMMAND, levels[0], "duty", _of_wheels(motion, *(hats(level, 9) * full for level in levels))
 
 
 def _wheel_difference(motion: _Motion) -> _Signal:
@@ -168,11 +167,10 @@ def _transients(motion: _Motion) -> _Signal:
 
 
 def _after_reversal(motion: _Motion) -> _Signal:
-    columns = []
-    for speed in (motion.left, motion.right):
-        gone = _since_reversal(speed) / motion.drives.tick_hz
-        columns.append(np.stack([np.exp(-gone / reach) for reach in (0.005, 0.015, 0.04, 0.12)], -1) * speed[..., None])
-    return Cue.REVERSAL, _since_reversal(motion.left) / motion.drives.tick_hz, "m", _of_wheels(motion, *columns)
+    gone = [_since_reversal(speed) / motion.drives.tick_hz for speed in motion.sides]
+    fading = (np.stack([np.exp(-way / reach) for reach in (0.005, 0.015, 0.04, 0.12)], axis=-1) for way in gone)
+    columns = (fades * speed[..., None] for fades, speed in zip(fading, motion.sides, strict=True))
+    return Cue.REVERSAL, gone[0], "m", _of_wheels(motion, *columns)
 
 
 def _since_reversal(speed: Floats) -> Floats:
@@ -188,10 +186,9 @@ def _since_reversal(speed: Floats) -> Floats:
 
 
 def _time(motion: _Motion) -> _Signal:
-    signal = np.broadcast_to(np.arange(motion.left.shape[1]) / motion.drives.tick_hz, motion.left.shape)
+    signal = np.broadcast_to(np.arange(motion.yaw.shape[1]) / motion.drives.tick_hz, motion.yaw.shape)
     columns = hats(signal)[..., 1:]
-    wheels = _of_wheels(motion, columns * motion.left[..., None], columns * motion.right[..., None])
-    return Cue.TIME, signal, "s", wheels
+    return Cue.TIME, signal, "s", _of_wheels(motion, *(columns * speed[..., None] for speed in motion.sides))
 
 
 def _use(motion: _Motion) -> _Signal:
@@ -233,10 +230,10 @@ def _position(motion: _Motion) -> _Signal:
 
 def _wheel_angle(motion: _Motion, side: int, name: Cue) -> _Signal:
     angle = motion.drives.angles[..., side]
-    speed = (motion.left, motion.right)[side]
-    waves = np.stack([wave(k * angle) for k in (1, 2) for wave in (np.cos, np.sin)], axis=-1) * speed[..., None]
-    own: Mapping[int, Floats] = {side: waves}
-    return name, np.mod(angle, 2.0 * np.pi), "rad", _of_wheels(motion, own.get(0), own.get(1))
+    waves = np.stack([wave(k * angle) for k in (1, 2) for wave in (np.cos, np.sin)], axis=-1)
+    columns = waves * motion.sides[side][..., None]
+    left, right = (columns, None) if side == 0 else (None, columns)
+    return name, np.mod(angle, 2.0 * np.pi), "rad", _of_wheels(motion, left, right)
 
 
 def _direction(motion: _Motion) -> _Signal:
@@ -320,5 +317,5 @@ def refit_beside_curve(declared: Fit, curve: SignalCurve) -> Theta:
     inner = np.abs(left) < HUBER
     step = -np.linalg.lstsq(declared.slopes[inner], left[inner], rcond=None)[0]
     low, high = spans(declared.free, drives)
-    here = np.array([theta[coordinate[0]] for coordinate in declared.free])
-    return theta_at(theta, declared.free, np.clip(here + step * (high - low), low, high))
+    moved = values_at(theta, declared.free) + step * (high - low)
+    return theta_at(theta, declared.free, np.clip(moved, low, high))

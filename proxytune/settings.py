@@ -290,7 +290,7 @@ def table_text(path: Path, kind: type[InputError], *, missing: str = "check the 
 
 
 def check_end(path: Path, usual_mb: float = TEXT_MB) -> None:
-    """Refuse a file that has no end or, in a few kilobytes of a disk, is of gigabytes.
+    """Refuse a file that has no end, or is larger than allowed: a few kilobytes of a disk may hold gigabytes.
 
     Raises:
         OSError: If it is a device, a named pipe or larger than that, or is not there.

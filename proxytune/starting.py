@@ -27,7 +27,7 @@ UNDER_WAY = ["proxytune", "run the same command again"]
 class LastingStream:
     """A stream of text that goes on where nobody reads any more, as after a terminal has gone: what is written is lost.
 
-    What the stream has else is here too.
+    All else is the stream's own.
     """
 
     def __init__(self, stream: TextIO) -> None:

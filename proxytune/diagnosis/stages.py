@@ -71,9 +71,9 @@ def _plain(value: Any) -> object:
 
 
 class Stages:
-    """Results of stages in the folder of findings, without one not kept; a link in their place is refused.
+    """Keeps results of stages in the folder of findings, if there is one; a symbolic link in their place is refused.
 
-    What is `known` is made anew each time, and results only refer to it.
+    What is `known` is not written: results refer to it by name.
     """
 
     def __init__(self, folder: Path | None, facts: str, report: Progress = lambda _: None, **known: Any) -> None:

@@ -18,9 +18,9 @@ TIMES = re.compile(r"(^|_|\b)(time|seconds|duration|survival|lifetime|steps)(_|\
 NO_TIMES = re.compile(r"diff|delta|advantage|gain|margin|offset|error|log|reward|per_|rate", re.IGNORECASE)
 """What names of metrics say that count from zero, and of those that may be below."""
 OTHER_UNIT = 8.0
-"""Where all agents' scores differ by about one factor, this one is no longer a matter of physics."""
+"""A factor on which agents agree is told from here on: no proxy's physics is so far off."""
 ANY_UNIT = 100.0
-"""Where they differ by this factor, they need not agree on it."""
+"""A factor on which they do not agree is told from here on."""
 AGREED = 0.3
 """Agents agree on a factor: half of them within this many powers of ten."""
 SAME_LENGTH = 1.05

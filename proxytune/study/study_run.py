@@ -234,10 +234,10 @@ class StudyRun:
         """The outcomes of episodes; those not simulated yet are simulated now.
 
         A failed episode counts as known where failures do not stop the study and the code that failed is still the
-        same; else it is tried again, since something is expected to have been corrected. So is, once, one that an
-        earlier run gave too little time. Where it is asked whether what is known of a domain instance is enough, agents
-        begin in their order, each in all instances, and none more begins in an instance after a yes. An EpisodeError is
-        raised if one fails and the study is to stop then.
+        same; else it is tried again, since something is expected to have been corrected. An episode that an earlier run
+        gave too little time is tried once more. With `enough`, agents begin in their order, each in all domain
+        instances, and no episode begins in an instance of which enough is known. An EpisodeError is raised if one fails
+        and the study is to stop then.
         """
         again = self.settings.stop_on_failure
         known = {e: o for e, o in self.known(planned).items() if not (o.failure and (again or e in self.corrected))}

@@ -122,7 +122,7 @@ def repeats(table: ScoreTable) -> Whole:
 
 
 def is_repeated(table: ScoreTable) -> bool:
-    """Check that each start has two repeats or more, and each agent drove one twice, to hold a domain to itself."""
+    """True if a domain can be held to itself: each start has two repeats or more, and each agent drove one twice."""
     labels, driven = np.bincount(start_places(table)), repeats(table)
     # A start that one agent alone drove is no start but a label of that agent's own.
     shared = (driven > 0).sum(axis=0) >= 2

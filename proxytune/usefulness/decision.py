@@ -33,8 +33,9 @@ MOST_DRAWN = 1_000_000
 """Draws of all agents together."""
 MOST_COMPARED, FEW_TASKS = 2000, 3
 BARELY_BEST = 0.3
-"""By the cube of the number of agents. A regret of 0 has a probability of its own: with 2.5 % for it, intervals of
-four equal agents would hold 87 %, of eight 67 %; so those of two to twenty hold about 96 %."""
+"""An agent's interval of regret begins at 0 if it is the best with more than this over the cube of the number of
+agents. Intervals of two to twenty equal agents then hold about 96 %; with a limit of 2.5 % those of four would hold
+87 %, of eight 67 %."""
 PRIOR = 1.0
 """Successes and failures before the first episode: every rate is as probable as any other."""
 NO_NOISE = (

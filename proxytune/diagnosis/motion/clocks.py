@@ -97,11 +97,11 @@ def on_one_clock(log: Log, robot: Robot, like: Clocks | None = None, model: Thet
 
 
 def read_clocks(log: Log, robot: Robot, like: Clocks | None = None, model: Theta | None = None) -> Clocks:
-    """Measure the latency of every drive of a log; where it is not what is left of a log it is like, clocks differ.
+    """Measure the latency of every drive of a log; clocks differ too if it is not what `like`, another log's, leave.
 
-    Latencies are those of a robot of first order. One that is slow in another way answers later to some commands than
-    to others, as if clocks jumped or drifted: with the θ of a `model` that leaves less of the speeds, a drift is told
-    only if its motion shows it too, and clocks of single drives only as they are beside it.
+    Latencies are those of a robot of first order. A robot that is slow in another way answers later to some commands
+    than to others, as if clocks jumped or drifted. So where the θ of a `model` leaves less of the speeds, its motion
+    has to show a drift too, and clocks of single drives are told as they are beside it.
     """
     drives = gather(log, robot, log.episodes, compared=False)
     speeds = latency.measured_speeds(drives) if len(drives.first) else None

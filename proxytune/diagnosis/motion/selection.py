@@ -161,7 +161,7 @@ def eliminate(found: Findings, report: Progress, without: Collection[str] = ()) 
     sure = list[AdoptedEffect]()
     while doubtful := [effect for effect in effects if effect.free and effect not in sure]:
         effect = _weakest(model, doubtful)
-        smaller = _fit_without(effect, model, base.drives)
+        smaller = _fit_without(effect, model)
         gain = _likelihood(model) - _likelihood(smaller)
         effects.remove(effect)
         if gain < rules.sure_gain_nats:
@@ -205,7 +205,7 @@ def drop_unconfirmed(
     """
     kept = list(adopted)
     for effect in sorted((one for one in adopted if one.free), key=lambda one: one.gain):
-        rules, without = model.drives.rules, _fit_without(effect, model, model.drives)
+        rules, without = model.drives.rules, _fit_without(effect, model)
         others = taken | {one.effect for one in kept if one is not effect}
         forms = [one for one in candidates(model.drives.robot, without.theta, others) if one.effect == effect.effect]
         p_value = min((one.p_value for one in screen(without, forms, seed)), default=1.0)
@@ -219,10 +219,10 @@ def drop_unconfirmed(
     return model, kept
 
 
-def _fit_without(effect: AdoptedEffect, model: Fit, drives: Drives) -> Fit:
+def _fit_without(effect: AdoptedEffect, model: Fit) -> Fit:
     """Fit all of a model but one of its effects again."""
-    rest = without_effect(Variant(model.theta, model.free), effect, drives.rate_hz)
-    return fit(drives, rest.theta, rest.free, model.noise)
+    rest = without_effect(Variant(model.theta, model.free), effect, model.drives.rate_hz)
+    return fit(model.drives, rest.theta, rest.free, model.noise)
 
 
 def _gain(one: Fit, other: Fit) -> float:
@@ -390,7 +390,7 @@ def drop_idle(model: Fit, adopted: Sequence[AdoptedEffect]) -> tuple[Fit, list[A
     # Random effects stay: they move no mean, so the likelihood of the mean cannot speak for them.
     for effect in adopted[:-1]:
         if effect.free and len(adopted) > 1:
-            without = _fit_without(effect, model, model.drives)
+            without = _fit_without(effect, model)
             if _gain(model, without) < model.drives.rules.least_gain_nats:
                 return without, [other for other in adopted if other is not effect]
     return model, list(adopted)

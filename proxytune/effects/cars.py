@@ -13,7 +13,7 @@ from typing import Any, NamedTuple, cast
 
 import numpy as np
 
-from proxytune.effects.command import CommandQuantisation, Delay
+from proxytune.effects.command import CommandQuantisation, Delay, ReversalPause
 from proxytune.effects.effect import (
     TURN,
     Cue,
@@ -39,7 +39,6 @@ from proxytune.effects.motors import (
     DriverMap,
     Gain,
     MotorLag,
-    ReversalPause,
     Saturation,
     SlewRate,
     ThermalFade,
@@ -324,6 +323,12 @@ def _trace(trace: Trace, column: int) -> Trace:
 _SERVO = "hobby servos of model cars"
 
 QUANTISATION = on_column(CommandQuantisation, THROTTLE, "command_quantisation", "Throttle is rounded to multiples.")
+PAUSE = on_column(
+    ReversalPause,
+    THROTTLE,
+    "reversal_pause",
+    "The speed controller lets the motor rest for `pause` before it drives it the other way.",
+)
 
 STEERED_COMMANDS: tuple[type[Effect], ...] = (
     on_column(CommandQuantisation, STEERING, "steering_quantisation", "Steering is rounded to multiples of a step.",
@@ -334,8 +339,6 @@ STEERED_COMMANDS: tuple[type[Effect], ...] = (
 )  # fmt: skip
 
 THROTTLED: tuple[type[Effect], ...] = (
-    on_column(ReversalPause, THROTTLE, "reversal_pause", "The speed controller lets the motor rest for `pause` before "
-              "it drives it the other way; a stand counts as rest."),
     on_column(SlewRate, THROTTLE, "slew_rate", "The motor's driver changes throttle no faster than from rest to full "
               "within `rise_time`."),
     on_column(DriverMap, THROTTLE, "driver_map"),

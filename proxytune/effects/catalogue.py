@@ -165,8 +165,8 @@ _TRACKER_AND_CAMERA: tuple[type[Effect], ...] = (
 )  # fmt: skip
 
 _ALL: tuple[type[Effect], ...] = (
-    command.DelayJitter, command.DroppedCommands, command.CommandQuantisation, command.Delay,
-    motors.ReversalPause, motors.SlewRate, motors.DriverMap, friction.DeadBand, friction.Stiction, motors.Saturation,
+    command.DelayJitter, command.DroppedCommands, command.CommandQuantisation, command.ReversalPause, command.Delay,
+    motors.SlewRate, motors.DriverMap, friction.DeadBand, friction.Stiction, motors.Saturation,
     motors.Trim, motors.WheelGain, motors.BatterySag, motors.ThermalFade, motors.MotorLag, friction.Backlash,
     friction.WheelRipple, motion.YawScrub, motion.Understeer, motion.YawLag, motion.Inertia,
     motion.TurnSlip, motion.LateralSlip, motion.CrossCoupling, motion.FloorSlope, motion.SlipperyPatch,
@@ -175,7 +175,7 @@ _ALL: tuple[type[Effect], ...] = (
 
 # What bends the angle of the wheels goes before what is lost by it, and the mass comes last
 _OF_CARS: tuple[type[Effect], ...] = (
-    command.DelayJitter, command.DroppedCommands, cars.QUANTISATION, command.Delay, *cars.STEERED_COMMANDS,
+    command.DelayJitter, command.DroppedCommands, cars.QUANTISATION, cars.PAUSE, command.Delay, *cars.STEERED_COMMANDS,
     *cars.STEERED, cars.SteeringBacklash, cars.SteeringOffset, cars.SteeringCurve,
     *cars.THROTTLED, cars.SteeringFriction, cars.Rolling,
     cars.Tyres, motion.YawLag, motion.TurnSlip, motion.FloorSlope, motion.SlipperyPatch,

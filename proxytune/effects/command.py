@@ -16,6 +16,7 @@ from proxytune.effects.effect import (
     Cue,
     Draws,
     FilterContext,
+    Form,
     Lateness,
     ShippedEffect,
     Signal,
@@ -25,6 +26,7 @@ from proxytune.effects.effect import (
     effect,
     parameter,
 )
+from proxytune.effects.features import newest_signs
 from proxytune.seeds import message_generator
 
 
@@ -73,6 +75,60 @@ class CommandQuantisation(ShippedEffect):
     def apply(self, signal: Signal, memory: None) -> tuple[Signal, None]:
         """Round each sample, halves to the even multiple."""
         return (signal if self.step == 0.0 else np.rint(signal / self.step) * self.step), None
+
+
+class ReversalState(NamedTuple):
+    """Which way each wheel was last driven, how many samples ago that ended and its rest began (…, 2), and the pause.
+
+    Times are in samples.
+    """
+
+    way: Signal
+    ended: Signal
+    rested: Signal
+    pause: float
+
+
+@effect("reversal_pause", Stage.COMMAND)
+class ReversalPause(ShippedEffect):
+    """The motor driver lets a wheel rest for `pause` before it drives it the other way.
+
+    Of a stand before the command to turn round, a share `stand` counts as rest. A constant delay may come before or
+    after; it comes after, since it blends commands, so that their signs would hang on it.
+    """
+
+    pause: float = parameter("s", 0.0, 5.0, probes=(0.05, 0.1, 0.2, 0.4, 0.8, 1.6), usual=(0.0, 2.0),
+        source="drivers that brake before they reverse: tenths of a second, of model cars up to two")  # fmt: skip
+    stand: float = parameter("", 0.0, 1.0, 1.0, probes=(0.0, 0.25, 0.5, 0.75),
+        source="1: the driver waits for the motor to rest; 0: for a time, whenever the sign of the command changes",
+        shape=True)  # fmt: skip
+    trace = Trace(
+        (Cue.TRANSIENTS, Cue.WHEEL_COMMAND),
+        WheelCurve.REVERSAL,
+        forms=(Form((("pause",),)), Form((("pause",),), "after a stand too", fixed={"stand": 0.0})),
+    )
+
+    def begin(self, context: FilterContext) -> ReversalState:
+        """The resting duty has been on for ever."""
+        rest = np.asarray(context.rest, dtype=float)
+        return ReversalState(
+            np.sign(rest), np.zeros(rest.shape), np.full(rest.shape, np.inf), self.pause * context.rate_hz
+        )
+
+    def apply(self, signal: Signal, memory: ReversalState) -> tuple[Signal, ReversalState]:
+        """Let through what of each sample comes after the pause."""
+        duty = np.moveaxis(signal, -2, -1)
+        starts, shape = np.arange(float(signal.shape[-2])), duty.shape[:-1]
+        before, ended = (np.broadcast_to(known, shape)[..., None] for known in (memory.way, -memory.ended))
+        way = newest_signs(np.concatenate((before, np.sign(duty)), axis=-1))
+        drives = np.where(duty != 0.0, starts + 1.0, -np.inf)
+        ended = np.maximum.accumulate(np.concatenate((ended, drives), axis=-1), axis=-1)
+        turned, rest = duty * way[..., :-1] < 0.0, starts - self.stand * (starts - ended[..., :-1])
+        rested = np.maximum(np.where(turned, rest, -np.inf), -memory.rested[..., None])
+        rested = np.maximum.accumulate(rested, axis=-1)
+        share = np.clip(starts + 1.0 - rested - memory.pause, 0.0, 1.0)
+        ended, rested = (len(starts) - newest[..., -1] for newest in (ended, rested))
+        return np.moveaxis(duty * share, -1, -2), ReversalState(way[..., -1], ended, rested, memory.pause)
 
 
 BLOCK = 256

@@ -16,9 +16,9 @@ ROBOT = read_robot("duckiebot")
 
 ORDER = (
     # command: what happens on the way to the robot, before the command arrives
-    "delay_jitter", "dropped_commands", "command_quantisation", "delay",
+    "delay_jitter", "dropped_commands", "command_quantisation", "reversal_pause", "delay",
     # actuation: controller, driver, friction, limits, wheels, motors, gears
-    "reversal_pause", "slew_rate", "driver_map", "dead_band", "stiction", "saturation", "trim", "wheel_gain",
+    "slew_rate", "driver_map", "dead_band", "stiction", "saturation", "trim", "wheel_gain",
     "battery_sag", "thermal_fade", "motor_lag", "backlash", "wheel_ripple",
     # motion: from wheels to the body, then the floor
     "yaw_scrub", "understeer", "yaw_lag", "inertia", "turn_slip", "lateral_slip", "cross_coupling",

@@ -5,8 +5,9 @@ import pytest
 from filtered import filtered
 
 from proxytune.effects import FilterContext, effect
+from proxytune.effects.command import ReversalPause
 from proxytune.effects.friction import Backlash, DeadBand, Stiction, WheelRipple
-from proxytune.effects.motors import BatterySag, ReversalPause, Saturation, SlewRate, ThermalFade
+from proxytune.effects.motors import BatterySag, Saturation, SlewRate, ThermalFade
 
 NOMINAL = {"full_speed": 0.6, "wheel_radius": 0.03}
 FULL_RAD_S = 20.0

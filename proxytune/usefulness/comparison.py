@@ -141,6 +141,28 @@ def by_start(table: ScoreTable) -> ScoreTable:
     return ScoreTable(table.agents, starts_of(table.episodes), table.metrics, values)
 
 
+def independence(table: ScoreTable, column: int) -> Floats:
+    """The share of each agent's episodes that counts as independent, shape (agents,): repeats of a start are alike.
+
+    With r repeats of a start it is 1/(1 + (r − 1) ICC), the intraclass correlation ICC being pooled over agents. Of
+    one start alone repeats count in full; where nothing varies each start counts once.
+    """
+    counts, places = repeats(table), start_places(table)
+    starts = (counts > 0).sum(axis=1)
+    between, within = int((starts - 1).sum()), int((table.counts - starts).sum())
+    if not between or not within:
+        return np.ones(len(table.agents))
+    means = by_start(table).values[..., column]
+    spread = counts * (means - table.means[:, [column]]) ** 2
+    outer = float(np.nansum(spread)) / between
+    inner = float(np.nansum((table.values[..., column] - means[:, places]) ** 2)) / within
+    alike = (counts**2).sum(axis=1) / table.counts
+    usual = float(table.counts.sum() - alike.sum()) / between
+    whole = outer + (usual - 1.0) * inner
+    icc = min(max((outer - inner) / whole, 0.0), 1.0) if whole > 0.0 else 1.0
+    return np.asarray(1.0 / (1.0 + (alike - 1.0) * icc), dtype=np.float64)
+
+
 def split_repeats(driven: Flags, places: Whole, keys: Floats) -> tuple[Flags, Flags]:
     """Split episodes into two sets (agents, splits, episodes) that hold the same starts, each as often.
 

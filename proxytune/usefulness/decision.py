@@ -4,8 +4,9 @@
     expected regret   = its mean over draws of μ       given the target's episodes, and the proxy's where they help
 
 μ is drawn of each agent and metric by what is known of it: of successes a Beta(successes + 1, failures + 1), the prior
-uniform; of other scores Student's t, its spread pooled over agents; of a published mean with a standard error a normal;
-of a published mean alone nothing is known of its noise, and no probability is given.
+uniform, and repeats of a start counting as far as they are independent; of other scores Student's t, its spread pooled
+over agents; of a published mean with a standard error a normal; of a published mean alone nothing is known of its
+noise, and no probability is given.
 """
 
 import itertools
@@ -20,7 +21,7 @@ from proxytune.arrays import NORMAL_95, Floats
 from proxytune.errors import InputError
 from proxytune.scores import ROUNDING, ScoreTable
 from proxytune.settings import nearest
-from proxytune.usefulness.comparison import Comparison, by_start, start_of
+from proxytune.usefulness.comparison import Comparison, by_start, independence, start_of
 from proxytune.usefulness.predictivity import orders
 from proxytune.usefulness.resampling import CONFIDENCE, Ends, interval
 from proxytune.usefulness.saving import Saving, effective, is_rate, rate_intervals, saving_of
@@ -180,7 +181,7 @@ def decide(inputs: Comparison, asked: Asked, saving: Saving | None = None, seed:
     middle, ends = sign * centre, [interval(sign * draws[:, row]) for row in range(len(agents))]
     most = np.zeros(len(agents))
     if len(columns) == 1 and is_rate(inputs.target, columns[0]):
-        ends = rate_intervals(middle, counts)
+        ends = rate_intervals(middle, counts * independence(inputs.target, columns[0]))
         # Of agents that, or whose best rival, always or never succeeded: there the prior pulls draws away from rates
         # at the end of what can be. The ends of their regrets follow from those of both rates (Zou and Donner, 2008,
         # "Construction of confidence limits about effect measures").
@@ -297,7 +298,8 @@ def draw_means(
         if rectified is not None:
             means, counts = rectified
         if is_rate(target, column):
-            drawn, basis = _rates(means, counts, draws, rng), "successes, uniform prior"
+            independent = counts * independence(target, column)
+            drawn, basis = _rates(means, independent, draws, rng), "successes, uniform prior"
         elif target.counts.min() > 1:
             drawn, basis = _means(target, column, means, counts, draws, rng), "episodes' spread, pooled over agents"
         elif target.errors is not None and (target.errors[:, column] > 0.0).any():

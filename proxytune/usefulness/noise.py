@@ -4,7 +4,8 @@
     chance         PRPV of a proxy that ranks at random; p = (1 + permutations as low) / (1 + permutations), or of up to
                    seven agents the share of all K! orders that score as low, which is exact
 
-Of metrics of zeros and ones each agent's rate has Wilson's interval, and the pairs of agents that tie are counted.
+Of metrics of zeros and ones each agent's rate has Wilson's interval, repeats of a start counting as far as they differ,
+and the pairs of agents that tie are counted.
 """
 
 import itertools
@@ -17,7 +18,15 @@ import numpy as np
 from proxytune.arrays import Flags
 from proxytune.scores import Metric, ScoreTable
 from proxytune.usefulness import resampling
-from proxytune.usefulness.comparison import Comparison, by_start, compare, is_repeated, split_repeats, start_places
+from proxytune.usefulness.comparison import (
+    Comparison,
+    by_start,
+    compare,
+    independence,
+    is_repeated,
+    split_repeats,
+    start_places,
+)
 from proxytune.usefulness.pairs import prpv_of_means, stand
 
 FloorKind = Literal["same starts", "halves", "none"]
@@ -113,7 +122,7 @@ def split_halves(driven: Flags, rng: np.random.Generator, splits: int) -> tuple[
 
 @dataclass(frozen=True)
 class Rate:
-    """The share of an agent's episodes that succeeded, with Wilson's 95 % interval: they are taken for independent."""
+    """The share of an agent's episodes that succeeded, with Wilson's 95 % interval over those that are independent."""
 
     value: float
     low: float
@@ -158,16 +167,16 @@ def success_rates(inputs: Comparison) -> tuple[SuccessRates, ...]:
 
 
 def _rates(table: ScoreTable, column: int) -> dict[str, Rate]:
-    # Loading scipy.stats takes longer than all else of most commands.
-    from scipy.stats import binomtest
+    from scipy.special import ndtri
 
-    rates = {}
-    for row, agent in enumerate(table.agents):
-        episodes = int(table.counts[row])
-        test = binomtest(round(float(np.nansum(table.values[row, :, column]))), episodes)
-        ends = test.proportion_ci(resampling.CONFIDENCE, method="wilson")
-        rates[agent] = Rate(float(test.statistic), float(ends.low), float(ends.high), episodes)
-    return rates
+    values, counts = table.means[:, column], table.counts * independence(table, column)
+    square = float(ndtri(0.5 + resampling.CONFIDENCE / 2.0)) ** 2
+    middle = (counts * values + square / 2.0) / (counts + square)
+    half = np.sqrt(square * (counts * values * (1.0 - values) + square / 4.0)) / (counts + square)
+    low = np.where(values <= 0.0, 0.0, middle - half)
+    high = np.where(values >= 1.0, 1.0, middle + half)
+    rows = zip(table.agents, values, low, high, table.counts, strict=True)
+    return {agent: Rate(float(value), float(one), float(other), int(n)) for agent, value, one, other, n in rows}
 
 
 MOST_ENUMERATED = 7

@@ -20,7 +20,7 @@ import numpy as np
 
 from proxytune.arrays import Flags, Floats
 from proxytune.scores import ScoreTable
-from proxytune.usefulness.comparison import Comparison, by_start, start_places, starts_of
+from proxytune.usefulness.comparison import Comparison, by_start, independence, start_places, starts_of
 from proxytune.usefulness.resampling import CONFIDENCE, Ends
 
 FEWEST_AGENTS = 4
@@ -213,17 +213,19 @@ def _pairs(every: Sequence[Comparison], column: int) -> _Pairs | None:
 
 def _variances(table: ScoreTable, column: int) -> Floats:
     """Variance of a rollout of each agent: of successes by their rate with two of each kind added, else pooled."""
-    values = table.values[..., column]
+    values, share = table.values[..., column], independence(table, column)
     if np.isin(values[table.driven], (0.0, 1.0)).all():
         # Two of each kind are the z²/2 of Agresti and Coull (1998): with one, intervals over few hold 92 %.
-        rates = (np.nansum(values, axis=1) + 2.0) / (table.counts + 4.0)
+        rates = (share * np.nansum(values, axis=1) + 2.0) / (share * table.counts + 4.0)
         return np.asarray(rates * (1.0 - rates), dtype=np.float64)
     squares = np.nansum((values - np.nanmean(values, axis=1, keepdims=True)) ** 2)
-    return np.full(len(table.agents), squares / max(1, table.counts.sum() - len(table.agents)))
+    return np.full(len(table.agents), squares / max(1.0, float(table.counts.sum() - (1.0 / share).sum())))
 
 
 def _with_ends(table: ScoreTable, column: int, means: Floats, counts: Floats) -> dict[str, tuple[float, Ends]]:
     """Means with their 95 % intervals: of rates as rates have them, else by Student's t."""
+    share = independence(table, column)
+    counts = counts * share
     if is_rate(table, column):
         return {
             agent: (float(mean), ends)
@@ -231,7 +233,7 @@ def _with_ends(table: ScoreTable, column: int, means: Floats, counts: Floats) ->
         }
     from scipy.special import stdtrit
 
-    freedom = max(1.0, float(table.counts.sum() - len(table.agents)))
+    freedom = max(1.0, float((share * table.counts).sum() - len(table.agents)))
     wider = float(stdtrit(freedom, 0.5 + CONFIDENCE / 2.0)) / NORMAL
     return _normal(table.agents, means, np.asarray(wider * np.sqrt(_variances(table, column) / counts)))
 
@@ -252,7 +254,7 @@ def _of_policies(every: Sequence[Comparison], column: int, real: float, simulate
             "none", None, None, None, real, simulated, reason=f"too few starts are paired, and there are {what}"
         )
     counts = inputs.target.counts.astype(np.float64)
-    variances = _variances(inputs.target, column) / counts
+    variances = _variances(inputs.target, column) / (counts * independence(inputs.target, column))
     if not (variances > 0.0).all():
         return Saving("none", None, None, None, real, simulated, reason="the target's rollouts do not differ")
     ones = np.ones(len(agents))

@@ -7,7 +7,8 @@ from score_tables import table_of
 from proxytune.errors import InputError, ScoresError
 from proxytune.scores import Metric, ScoreTable
 from proxytune.usefulness import Asked, compare, decide, decision, mmrv_conventions, sequential_test
-from proxytune.usefulness.noise import chance
+from proxytune.usefulness.comparison import by_start, independence
+from proxytune.usefulness.noise import chance, success_rates
 from proxytune.usefulness.sequential import plan
 
 SUCCESS = [Metric("success")]
@@ -107,6 +108,27 @@ def test_the_regret_of_equal_agents_is_held_as_often_as_is_said(monkeypatch):
         found = decide(compare(proxy=table, target=table, metrics=SUCCESS), Asked(), None, seed)
         held += [low <= 1e-9 for low, _ in found.regret_interval.values()]
     assert np.mean(held) > 0.93
+
+
+def test_repeats_of_a_start_that_always_turn_out_alike_make_nobody_surer():
+    fixed = np.array([[1, 1, 0, 1, 1, 1], [0, 1, 0, 1, 0, 0]], dtype=float)
+    labels = tuple(f"{start}/{repeat}" for start in range(6) for repeat in range(5))
+    table = ScoreTable(("a", "b"), labels, ("success",), np.repeat(fixed, 5, axis=1)[..., None])
+    inputs, once = (compare(proxy=one, target=one, metrics=SUCCESS) for one in (table, by_start(table)))
+    many, few = decide(inputs, Asked(), None, 1), decide(once, Asked(), None, 1)
+    assert many.best_probabilities == pytest.approx(few.best_probabilities)
+    assert many.scores["a"][1] == pytest.approx(few.scores["a"][1])
+    assert many.regret_interval["b"] == pytest.approx(few.regret_interval["b"])
+    rates = [success_rates(one)[0].target["a"] for one in (inputs, once)]
+    assert rates[0].low == pytest.approx(rates[1].low)
+    assert rates[0].episodes == 30
+    assert plan(many, bound=0.001, made=np.full(2, 30.0), scale=1.0).total > 0
+    rng = np.random.default_rng(0)
+    rolled_anew = table_of((rng.random((2, 30)) < 0.5).astype(float), metrics=("success",))
+    assert independence(rolled_anew, 0).tolist() == [1.0, 1.0]
+    values = (rng.random((40, 30, 1)) < 0.5).astype(float)
+    chance_alone = ScoreTable(tuple(map(str, range(40))), labels, ("success",), values)
+    assert independence(chance_alone, 0).min() > 0.8
 
 
 @pytest.mark.parametrize("direction", ["max", "min"])

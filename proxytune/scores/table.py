@@ -75,7 +75,7 @@ class Metric:
         largest = np.abs(columns).max(axis=-1, keepdims=True)
         if not self.percent:
             signed = columns if self.direction == "max" else -columns
-            return signed, np.maximum(self.tolerance, ROUNDING * largest)
+            return signed, self.tolerance + ROUNDING * largest
         shares = columns / np.where(largest > 0, largest, 1.0)
         merits = shares if self.direction == "max" else 1.0 - shares
         return merits, np.full_like(largest, max(self.tolerance / 100, ROUNDING))

@@ -99,6 +99,9 @@ def test_differences_up_to_the_tolerance_or_by_rounding_are_ties():
     assert dominance(scores, [Metric("m", "max", 0.5)])[:, 0].tolist() == [0.5, 0.5, 1.0]
     assert dominance(scores, [Metric("m", "max", 25.0, percent=True)])[:, 0].tolist() == [0.5, 0.5, 1.0]
     assert dominance(scores, [Metric("m", "min", 0.5)])[:, 0].tolist() == [0.5, 0.5, 0.0]
+    for tenths in range(10):  # 0.4 − 0.3 is 0.10000000000000003
+        rates = np.array([[tenths / 10], [(tenths + 1) / 10]])
+        assert dominance(rates, [Metric("m", "max", 0.1)])[0].tolist() == [0.5, 0.5]
     one = ScoreTable.from_episodes({("A", e): {"m": 0.1} for e in range(10)} | {("B", 0): {"m": 0.1}})
     assert dominance(one.means, [Metric("m")]).tolist() == [[0.5, 0.5], [0.5, 0.5]]
     assert dominance(np.array([[0.1 + 0.2], [0.3]]), [Metric("m")]).tolist() == [[0.5, 0.5], [0.5, 0.5]]

@@ -203,9 +203,11 @@ def choices_sentences(assessments: Mapping[str, Assessment], selection: Selectio
     """Say of every proxy what it would have chosen and saves, and of which two the choice differs beyond noise."""
     lines = []
     for name, one in assessments.items():
-        regret = short(one.decision.expected_regret[one.decision.observed.proxy_winners[0]], 2)
+        regret = short(one.decision.expected_regret[one.decision.chosen_by_proxy], 2)
         winners = _few(one.decision.observed.proxy_winners)
-        lines.append(f"{name}: chooses {winners}, at an expected regret of {regret}; {saving_sentence(one.saves)}")
+        most = "up to " if len(one.decision.observed.proxy_winners) > 1 else ""
+        told = f"chooses {winners}, at an expected regret of {most}{regret}"
+        lines.append(f"{name}: {told}; {saving_sentence(one.saves)}")
     for choice in selection.choices:
         if choice.value > 0.0 or choice.on == "rollouts":
             told = {True: "beyond noise", False: "not beyond noise", None: "noise not known"}[choice.beyond_noise]

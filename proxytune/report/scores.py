@@ -33,8 +33,9 @@ def score_sentence(assessments: Assessments, selection: Selection | None, *, tar
     worse = [pair.worse for pair in selection.differences if pair.better == best and pair.beyond_noise]
     beyond = f"beyond noise better than {listed(worse)}" if worse else "not beyond noise better than any other"
     alike = [pair.worse for pair in selection.differences if pair.better == best and pair.value == 0.0]
-    ranks = f"{listed([best, *alike])} rank the agents alike," if alike else f"{best} ranks the agents"
-    return f"{ranks} most like {target}, {beyond}. {_say_prpv(assessments[best], best, target)}"
+    ranks = f"{listed([best, *alike])} rank" if alike else f"{best} ranks"
+    each = f" (PRPV {selection.ranking[0][1]} each)" if alike else ""
+    return f"{ranks} the agents most like {target}{each}, {beyond}. {_say_prpv(assessments[best], best, target)}"
 
 
 def _say_prpv(assessment: Assessment, proxy: str, target: str) -> str:

@@ -127,6 +127,11 @@ class Decision:
         return pd.DataFrame.from_dict(rows, orient="index", columns=heads).rename_axis("agent")
 
     @property
+    def chosen_by_proxy(self) -> str:
+        """The agent of the highest mean in the proxy; of several that tie, the one of the highest expected regret."""
+        return max(self.observed.proxy_winners, key=lambda agent: self.expected_regret[agent])
+
+    @property
     def notes(self) -> tuple[str, ...]:
         """Lines on what the decision rests on, or why it says little."""
         lines = [f"chosen by {self.basis}" if self.draws is not None else NO_NOISE]
@@ -368,7 +373,7 @@ def compare_choices(inputs: Mapping[str, Comparison], asked: Asked, seed: int = 
     for pair in itertools.combinations(found, 2):
         # The target is one: regrets and draws of both are the same.
         target, agents = found[pair[0]], inputs[pair[0]].agents
-        winner = {name: found[name].observed.proxy_winners[0] for name in pair}
+        winner = {name: found[name].chosen_by_proxy for name in pair}
         better, worse = sorted(pair, key=lambda name: target.expected_regret[winner[name]])
         gain = target.expected_regret[winner[worse]] - target.expected_regret[winner[better]]
         ends: tuple[float | None, float | None] = (None, None)

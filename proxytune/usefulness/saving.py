@@ -249,10 +249,9 @@ def _of_policies(every: Sequence[Comparison], column: int, real: float, simulate
     proxies, target = np.stack([one.means[0][:, column] for one in every], axis=1), inputs.means[1][:, column]
     fewest = FEWEST_AGENTS + len(every) - 1
     if len(agents) < fewest or np.ptp(proxies, axis=0).min() <= 0.0:
-        what = f"fewer than {fewest} agents" if len(agents) < fewest else "all agents score alike in the proxy"
-        return Saving(
-            "none", None, None, None, real, simulated, reason=f"too few starts are paired, and there are {what}"
-        )
+        few = f"there are fewer than {fewest} agents"
+        what = few if len(agents) < fewest else "all agents score alike in the proxy"
+        return Saving("none", None, None, None, real, simulated, reason=f"too few starts are paired, and {what}")
     counts = inputs.target.counts.astype(np.float64)
     variances = _variances(inputs.target, column) / (counts * independence(inputs.target, column))
     if not (variances > 0.0).all():

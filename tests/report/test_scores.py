@@ -1,15 +1,18 @@
 """Page and figures of `score`."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from score_tables import table_of
 
+from proxytune.report.decision import choices_sentences
 from proxytune.report.score_figures import FLIP_COLOURS, LONGEST, MOST, flipped_pairs_figure, scatter_figure
 from proxytune.report.scores import score_next_step, score_sentence, write_score_report
 from proxytune.report.view import foot_of
 from proxytune.report.writing import save_figure
 from proxytune.scores import Metric, ScoreTable
-from proxytune.usefulness import assess, select_proxy
+from proxytune.usefulness import assess, assess_each, select_proxy
 
 M = (Metric("distance"),)
 EVIL = "<script>alert(1)</script>"
@@ -54,8 +57,18 @@ def test_the_answer_says_prpv_and_chance_of_single_episodes_that_more_are_needed
     selection = select_proxy(proxies=twins, target=TARGET, metrics=M, resamples=100)
     found = {name: assessed(one) for name, one in twins.items()}
     told = score_sentence(found, selection, target="t")
-    assert "good and other rank the agents alike, most like t, not beyond noise better than any other" in told
+    assert "good and other rank the agents most like t (PRPV 0 each), not beyond noise better than any other" in told
     assert "tell the best proxies apart" in score_next_step(found, selection)
+
+
+def test_of_several_proxies_one_that_ties_its_winners_is_said_to_cost_what_the_worse_of_them_does():
+    best_first = table([3, 2, 1, 0])
+    both = {"flat": replace(best_first, values=np.ones((4, 4, 1))).unpaired(), "good": best_first}
+    found, selection = assess_each(proxies=both, target=best_first, metrics=M, resamples=100)
+    lines = choices_sentences(found, selection, "t")
+    assert "at an expected regret of up to 3; " in lines[0]
+    assert "too few starts are paired, and all agents score alike in the proxy" in lines[0]
+    assert lines[2].startswith("choosing by good instead of flat gains 3 ")
 
 
 @pytest.mark.slow

@@ -23,7 +23,9 @@ def decision_sentence(assessment: Assessment, target: str) -> str:
         cost = short(decision.observed.regret, 2)
         observed = f"in the proxy {winners} {wins}, which by the target's means costs {cost}"
     if decision.probability_best is None:
-        return f"By the means as published, {decision.winner} is the best {where}; {observed}."
+        best = decision.observed.target_winners
+        are = f"{_few(best)} tie as the best" if len(best) > 1 else f"{best[0]} is the best"
+        return f"By the means as published, {are} {where}; {observed}."
     risk = f"{percent(min(decision.probability_best, 0.9999))} to be the best {where}, expected regret "
     risk += f"{short(decision.expected_regret[decision.winner], 2)} in {decision.chosen_on}"
     others = decision.not_told_apart

@@ -177,7 +177,9 @@ def decide(inputs: Comparison, asked: Asked, saving: Saving | None = None, seed:
     every, counts, centre, basis = known
     draws = np.mean(every, axis=0)
     regret = draws.max(axis=1, keepdims=True) - draws
-    expected, best = regret.mean(axis=0), np.bincount(draws.argmax(axis=1), minlength=len(agents)) / len(draws)
+    on_top = regret <= ROUNDING * max(1.0, float(np.abs(draws).max()))
+    # Agents that tie, as those that never differ, share the probability.
+    expected, best = regret.mean(axis=0), (on_top / on_top.sum(axis=1, keepdims=True)).mean(axis=0)
     place = int(expected.argmin())
     order = np.argsort(-best, kind="stable")
     held = order[: int(np.searchsorted(np.cumsum(best[order]), CONFIDENCE - ROUNDING)) + 1]

@@ -43,6 +43,9 @@ def test_the_answer_says_prpv_and_chance_of_single_episodes_that_more_are_needed
     assert ": better than chance (" in answer
     assert "no better than chance (" in score_sentence({"b": bad}, None, target="t")
     assert "until chance can be excluded" in score_next_step({"b": bad}, None)
+    tie = table_of([[2.0], [2.0], [1.0]], metrics=("distance",))
+    tied = score_sentence({"a": assess(proxy=tie, target=tie, metrics=M, resamples=100)}, None, target="t")
+    assert "By the means as published, A0 and A1 tie as the best on t;" in tied
     single = assess(proxy=table(range(5), 1), target=table(range(5), 1), metrics=M, resamples=100)
     assert "of 0, of at most 20" in score_sentence({"a": single}, None, target="t")
     assert "at least two episodes" in score_next_step({"a": single}, None)

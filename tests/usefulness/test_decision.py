@@ -73,6 +73,13 @@ def test_means_without_rollouts_give_the_observed_regret_also_where_less_is_bett
     assert observed.regret == pytest.approx(0.2)
 
 
+def test_agents_that_tie_without_noise_share_the_probability_to_be_the_best():
+    table = table_of([[1.5] * 3, [1.5] * 3, [1.0] * 3])
+    found = decided(table, table, [Metric("m")])
+    assert found.best_probabilities == {"A0": 0.5, "A1": 0.5, "A2": 0.0}
+    assert found.not_told_apart == ("A1",)
+
+
 def test_tasks_also_by_their_starts_are_averaged_and_left_out_one_at_a_time_each_with_a_regret():
     proxy = means(["x", "y", "z"], a=(0.9, 0.1, 0.1), b=(0.2, 0.3, 0.3))
     target = means(["x", "y", "z"], a=(0.9, 0.0, 0.1), b=(0.1, 0.3, 0.3))

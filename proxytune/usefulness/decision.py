@@ -187,6 +187,8 @@ def decide(inputs: Comparison, asked: Asked, saving: Saving | None = None, seed:
     sign = signs[0]
     middle, ends = sign * centre, [interval(sign * draws[:, row]) for row in range(len(agents))]
     most = np.zeros(len(agents))
+    if inputs.target.counts.min() > 1 and not any(is_rate(inputs.target, column) for column in columns):
+        ends = _own_intervals(inputs.target, columns, middle, counts)
     if len(columns) == 1 and is_rate(inputs.target, columns[0]):
         ends = rate_intervals(middle, counts * independence(inputs.target, columns[0]))
         # Of agents that, or whose best rival, always or never succeeded: there the prior pulls draws away from rates
@@ -349,6 +351,17 @@ def _means(
     per = effective(counts, table, starts)
     scale = spread / np.sqrt(per) * np.sqrt(freedom / rng.chisquare(freedom, (draws, 1)))
     return np.asarray(means + scale * rng.standard_normal((draws, len(means))), dtype=np.float64)
+
+
+def _own_intervals(table: ScoreTable, columns: Sequence[int], middle: Floats, counts: Floats) -> list[Ends]:
+    """Student's t of each agent's own scores about its mean: what a start does to all agents alike belongs to it."""
+    from scipy.special import stdtrit
+
+    starts = by_start(table)
+    starts = starts if starts.counts.min() > 1 else table
+    spread = np.nanstd(starts.values[..., columns].mean(axis=-1), axis=1, ddof=1)
+    reach = stdtrit(starts.counts - 1.0, 0.5 + CONFIDENCE / 2.0) * spread / np.sqrt(effective(counts, table, starts))
+    return list(zip(map(float, middle - reach), map(float, middle + reach), strict=True))
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy import stats
 from score_tables import table_of
 
 from proxytune.errors import InputError, ScoresError
@@ -78,6 +79,17 @@ def test_agents_that_tie_without_noise_share_the_probability_to_be_the_best():
     found = decided(table, table, [Metric("m")])
     assert found.best_probabilities == {"A0": 0.5, "A1": 0.5, "A2": 0.0}
     assert found.not_told_apart == ("A1",)
+
+
+def test_the_interval_of_a_score_is_by_its_own_spread_over_starts_also_where_these_move_all_agents_alike():
+    rng = np.random.default_rng(0)
+    values = rng.normal(0.0, 3.0, 8) + 0.1 * rng.normal(size=(4, 8))
+    table = table_of(values)
+    found = decided(table, table, [Metric("m")])
+    for row, (mean, (low, high)) in enumerate(found.scores.values()):
+        own = stats.t.interval(0.95, 7, values[row].mean(), stats.sem(values[row]))
+        assert (mean, low, high) == pytest.approx((values[row].mean(), *own))
+    assert found.regret_interval["A0"][1] < 0.5
 
 
 def test_tasks_also_by_their_starts_are_averaged_and_left_out_one_at_a_time_each_with_a_regret():

@@ -17,7 +17,7 @@ from proxytune.scores import Metric
 from proxytune.usefulness.assessment import Assessment
 from proxytune.usefulness.pairs import prpv_of_means
 from proxytune.usefulness.predictivity import ppv_of_means, weights_of_spread
-from proxytune.usefulness.resampling import Ends, bootstrap_means, in_blocks, interval_where_defined
+from proxytune.usefulness.resampling import Ends, bootstrap_means, in_blocks, interval_around
 
 ALL = ""
 """Stands in for the metric's name where a measure has one value for all metrics."""
@@ -94,11 +94,12 @@ class Measure:
             return values if self.per_metric else values[..., None]
 
         names = [metric.name for metric in inputs.metrics] if self.per_metric else [ALL]
-        ends: Sequence[Ends | None] = [None] * len(names)
+        found, ends = by_metric(*inputs.means), list[Ends | None]([None] * len(names))
         if assessment.intervals is not None:
             means = bootstrap_means(inputs, resamples=assessment.prpv_interval.resamples, seed=assessment.seed)
-            ends = [interval_where_defined(one) for one in in_blocks(by_metric, *means).T]
-        values = [None if np.isnan(value) else float(value) for value in by_metric(*inputs.means)]
+            resampled = in_blocks(by_metric, *means).T
+            ends = [interval_around(float(value), one) for value, one in zip(found, resampled, strict=True)]
+        values = [None if np.isnan(value) else float(value) for value in found]
         return dict(zip(names, map(Measured, values, ends), strict=True))
 
     def of_means(self, *, proxy: Floats, target: Floats, metrics: Sequence[Metric]) -> float:

@@ -1,8 +1,8 @@
 """Bootstrap over episodes: what the measures would be, had the same agents driven other episodes.
 
 Starts are drawn with replacement, each with all its repeats, and a measure of the mean scores of every draw has a
-central 95 % interval: for PRPV, widened to hold its value, and for PPV, the correlations and MMRV. Where all agents
-drove the same episodes they share the draws; where both domains have the same starts, so do these.
+central 95 % interval, widened to hold its value. Where all agents drove the same episodes they share the draws; where
+both domains have the same starts, so do these.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -161,7 +161,10 @@ UNDEFINED_SHARE = 0.05
 
 @dataclass(frozen=True)
 class Intervals:
-    """Percentile bootstrap intervals of the measures beside PRPV; None where one is undefined."""
+    """Percentile bootstrap intervals of the measures beside PRPV, each holding its value; None where one is undefined.
+
+    Like PRPV's they are of what such tables score: noise adds errors and wrong orders that endless episodes had not.
+    """
 
     ppv: Ends | None
     srcc: Mapping[str, Ends | None]
@@ -176,21 +179,28 @@ def intervals(*, inputs: Comparison, error: Ppv, means: Means | None) -> Interva
     weights = np.array([error.beta[metric.name] or 0.0 for metric in inputs.metrics])
     each, ppv = inputs.target.means.size, None
     if error.value is not None:
-        ppv = interval(in_blocks(lambda p, t: ppv_of_means(p, t, weights), *means, numbers=each))
+        ppv = interval_around(error.value, in_blocks(lambda p, t: ppv_of_means(p, t, weights), *means, numbers=each))
+
+    def per_metric(measure: Callable[[Floats, Floats], Floats], numbers: int | None = None) -> dict[str, Ends | None]:
+        resampled = in_blocks(measure, *means, numbers=numbers).T
+        rows = zip(inputs.metrics, measure(*inputs.means), resampled, strict=True)
+        return {metric.name: interval_around(float(value), values) for metric, value, values in rows}
+
     return Intervals(
         ppv=ppv,
-        srcc=_per_metric(inputs.metrics, in_blocks(pearson_of_means, *means, numbers=each)),
-        kendall_tau=_per_metric(inputs.metrics, in_blocks(kendall_of_means, *means)),
-        mmrv=_per_metric(inputs.metrics, in_blocks(lambda p, t: mmrv_of_means(p, t, inputs.metrics), *means)),
+        srcc=per_metric(pearson_of_means, each),
+        kendall_tau=per_metric(kendall_of_means),
+        mmrv=per_metric(lambda p, t: mmrv_of_means(p, t, inputs.metrics)),
     )
 
 
-def _per_metric(metrics: Sequence[Metric], values: Floats) -> dict[str, Ends | None]:
-    """Intervals of values of shape (resamples, metrics)."""
-    return {metric.name: interval_where_defined(column) for metric, column in zip(metrics, values.T, strict=True)}
+def interval_around(value: float, resampled: Floats) -> Ends | None:
+    """The interval of resamples, the undefined left out, widened to hold a value if that is defined.
 
-
-def interval_where_defined(values: Floats) -> Ends | None:
-    """The interval of values of resamples, the undefined ones left out; None if these are too many."""
-    undefined = np.isnan(values)
-    return interval(values[~undefined]) if undefined.mean() <= UNDEFINED_SHARE else None
+    None if too many are undefined.
+    """
+    undefined = np.isnan(resampled)
+    if undefined.mean() > UNDEFINED_SHARE:
+        return None
+    low, high = interval(resampled[~undefined])
+    return float(np.fmin(low, value)), float(np.fmax(high, value))

@@ -5,7 +5,7 @@ import pytest
 from score_tables import bootstrap_prpv, table_of
 
 from proxytune.scores import Metric
-from proxytune.usefulness import bootstrap_means, compare, prpv_of_means
+from proxytune.usefulness import assess, bootstrap_means, compare, prpv_of_means
 from proxytune.usefulness.resampling import draw_counts
 
 M = (Metric("m"), Metric("n"))
@@ -33,6 +33,10 @@ def test_the_interval_holds_the_value_follows_from_the_seed_and_is_a_point_witho
     result = bootstrap_prpv(proxy=same, target=noisy(1, agents=8, noise=3.0), metrics=M)
     assert result.value == result.low == 0
     assert result.expected > 5
+    every = assess(proxy=same, target=noisy(1, agents=8, noise=3.0), metrics=M, resamples=200)
+    assert every.intervals.ppv[0] == every.ppv.value == pytest.approx(0.0, abs=1e-12)
+    assert every.intervals.mmrv["m"][0] == every.mmrv.value["m"] == 0.0
+    assert every.intervals.srcc["m"][1] == every.srcc.value["m"]
     sides = {"proxy": noisy(1, episodes=9), "target": noisy(2, episodes=9), "metrics": M}
     first, again, other = (bootstrap_prpv(**sides, seed=seed) for seed in (1, 1, 2))
     assert (first.expected, first.low, first.high) == (again.expected, again.low, again.high)

@@ -111,7 +111,7 @@ def mmrv(inputs: Comparison) -> Mmrv:
 
 SIMPLER_EPSILON = 1e-8
 """SIMPLER adds this to Pearson's denominator unless both sides are equal; so do we, for its published figures to come
-out to every digit. Elsewhere it is below notice, as long as scores are not of the order of 1e-4 or less."""
+out to every digit. Of small scores it is no more than a hundred-thousandth of the denominator, whatever their unit."""
 
 
 @dataclass(frozen=True)
@@ -127,7 +127,8 @@ def pearson_of_means(proxy: Floats, target: Floats) -> Floats:
     one = proxy - proxy.mean(axis=-2, keepdims=True)
     other = target - target.mean(axis=-2, keepdims=True)
     norms = np.sqrt((one**2).sum(axis=-2) * (other**2).sum(axis=-2))
-    coefficients = np.where((one == other).all(axis=-2), 1.0, (one * other).sum(axis=-2) / (norms + SIMPLER_EPSILON))
+    norms = np.where(norms > 0.0, norms + np.minimum(SIMPLER_EPSILON, 1e-5 * norms), 1.0)
+    coefficients = np.where((one == other).all(axis=-2), 1.0, (one * other).sum(axis=-2) / norms)
     return np.where(varies(proxy) & varies(target), np.clip(coefficients, -1, 1), np.nan)
 
 

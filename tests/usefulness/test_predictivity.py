@@ -24,6 +24,7 @@ def test_correlations_agree_with_scipy_and_simplers_figures_come_out_by_its_doub
         one, other = proxy[i, :, column], target[i, :, column]
         assert pearson[i, column] == pytest.approx(stats.pearsonr(one, other).statistic, abs=1e-7)
         assert kendall[i, column] == pytest.approx(stats.kendalltau(one, other).statistic, abs=1e-12)
+    np.testing.assert_allclose(pearson_of_means(1e-5 * proxy, 1e-5 * target), pearson, atol=2e-5)
 
     proxy, target = of_means((1, 5), (2, 5), (3, 5)), of_means((1, 1), (2, 2), (2, 3))
     for measure in (srcc, predictivity.kendall_tau):

@@ -42,9 +42,9 @@ PERFECT = (
     "take more starts to see one"
 )
 HALVES = (
-    "PRPV is no higher than two halves of the target's episodes score against each other; halves hold other starts, "
-    "so this does not show that the proxy is perfect; to know, measure the target at least twice from each start "
-    "(episodes START/REPEAT)"
+    "PRPV is no higher than two halves of the target's episodes may score against each other (95 %); halves hold other "
+    "starts, so this does not show that the proxy is perfect; to know, measure the target at least twice from each "
+    "start (episodes START/REPEAT)"
 )
 
 

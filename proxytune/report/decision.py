@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from proxytune.report import figure_style as style
 from proxytune.report.score_figures import MOST, short_name
 from proxytune.report.view import Table, columns_of
-from proxytune.report.wording import listed, percent, plain, short, with_span
+from proxytune.report.wording import as_known, listed, percent, plain, short, span, with_span
 from proxytune.usefulness import Assessment, Decision, Panel, Plan, Saving, Selection, Sequential, mmrv_conventions
 
 
@@ -80,13 +80,13 @@ def decision_table(assessment: Assessment, target: str) -> Table:
     rows = []
     for agent in sorted(decision.expected_regret, key=lambda one: decision.expected_regret[one]):
         scored = decision.scores[agent] if decision.scores else None
-        span = decision.regret_interval[agent] if decision.regret_interval else (None, None)
+        ends = decision.regret_interval[agent] if decision.regret_interval else (None, None)
         chance = decision.best_probabilities[agent] if decision.best_probabilities else None
         rows.append((
             agent,
-            with_span(scored[0], *scored[1]) if scored else "–",
+            f"{as_known(*scored)} ({span(scored[1])})" if scored else "–",
             "–" if chance is None else "> 0.99" if 0.995 <= chance < 1.0 else f"{chance:.2g}",
-            with_span(short(decision.expected_regret[agent], 2), *span),
+            with_span(decision.expected_regret[agent], *ends),
             str(plan.rollouts.get(agent, "")),
         ))  # fmt: skip
     heads = (f"{decision.chosen_on} on the target", "best with", "expected regret", "more rollouts")

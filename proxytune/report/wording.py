@@ -4,6 +4,8 @@ import math
 from collections.abc import Sequence
 
 Ends = tuple[float, float]
+LARGEST_WHOLE = 1e7
+"""Beyond this a number has an exponent."""
 
 
 def digits(ends: Ends) -> int:
@@ -19,8 +21,9 @@ def fixed(value: float, decimals: int) -> str:
 
 
 def short(value: float, figures: int = 3) -> str:
-    """A number of three significant figures; of four where it is to be used again."""
-    return f"{value:.{figures}g}".replace("-", "−")
+    """A number of three significant figures, or all before the point; of four where it is to be used again."""
+    whole = 10**figures - 0.5 <= abs(value) < LARGEST_WHOLE
+    return (f"{value:.0f}" if whole else f"{value:.{figures}g}").replace("-", "−")
 
 
 def span(ends: Ends, decimals: int | None = None) -> str:

@@ -198,14 +198,15 @@ def decide(inputs: Comparison, asked: Asked, saving: Saving | None = None, seed:
         best_rival, settled = int(centre.argmax()), (middle <= 0.0) | (middle >= 1.0)
         reach = np.hypot(low_high[best_rival, 1] - centre[best_rival], centre - low_high[:, 0])
         most = np.where(settled | settled[best_rival], centre[best_rival] - centre + reach, 0.0)
+    highest = np.array([most, expected])
     return replace(
         bare,
         winner=agents[place],
         probability_best=float(best[place]),
         expected_regret=dict(zip(agents, map(float, expected), strict=True)),
         regret_interval={
-            # No regret at all belongs to it unless the agent is very unlikely to be the best.
-            agent: (0.0 if best[row] > BARELY_BEST / len(agents) ** 3 else low, max(high, most[row]))
+            # No regret at all belongs to it unless the agent is very unlikely to be the best; the expected one always.
+            agent: (0.0 if best[row] > BARELY_BEST / len(agents) ** 3 else low, float(max(high, *highest[:, row])))
             for row, (agent, (low, high)) in enumerate(zip(agents, map(interval, regret.T), strict=True))
         },
         best_probabilities=dict(zip(agents, map(float, best), strict=True)),

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from score_tables import table_of
 
-from proxytune.report.decision import choices_sentences
+from proxytune.report.decision import choices_sentences, decision_table
 from proxytune.report.score_figures import FLIP_COLOURS, LONGEST, MOST, flipped_pairs_figure, scatter_figure
 from proxytune.report.scores import score_next_step, score_sentence, write_score_report
 from proxytune.report.view import foot_of
@@ -62,6 +62,14 @@ def test_the_answer_says_prpv_and_chance_of_single_episodes_that_more_are_needed
     told = score_sentence(found, selection, target="t")
     assert "good and other rank the agents most like t (PRPV 0 each), not beyond noise better than any other" in told
     assert "tell the best proxies apart" in score_next_step(found, selection)
+
+
+def test_large_scores_that_differ_little_are_told_to_the_digits_of_their_intervals():
+    large = table(12000 + np.arange(4))
+    rows = decision_table(assess(proxy=large, target=large, metrics=M, resamples=100), "t").rows
+    scores = [row[1] for row in rows]
+    assert len(set(scores)) == 4
+    assert all(score.startswith("120") and "e" not in score for score in scores)
 
 
 def test_of_several_proxies_one_that_ties_its_winners_is_said_to_cost_what_the_worse_of_them_does():

@@ -92,6 +92,7 @@ def test_a_score_above_the_floor_is_not_called_found_and_what_chance_explains_ha
         "is 16 (13 to 19), a perfect proxy's 5 (1 to 9): better than chance, but a perfect proxy scores lower, " in text
     )
     assert "by 4 to 18." in text
+    assert "scores lower, by at most 5." in said(**{**ABOVE, "excess": Estimate(2.5, 0.4, 4.6)})
     assert "found" not in text
     text = said(perfect=False, inside=False)
     assert text.startswith("θ narrowed down to 0.16 % of the box: ")

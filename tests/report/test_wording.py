@@ -1,6 +1,6 @@
 """Numbers and names as people read them."""
 
-from proxytune.report.wording import digits, fixed, listed, percent, plain, probability, span
+from proxytune.report.wording import digits, fixed, listed, percent, plain, probability, short, span
 
 
 def test_numbers_have_a_true_minus_and_as_many_figures_as_their_width_allows_and_names_make_a_list():
@@ -8,6 +8,9 @@ def test_numbers_have_a_true_minus_and_as_many_figures_as_their_width_allows_and
     assert fixed(-0.12, 2) == "−0.12"
     assert fixed(-0.0001, 2) == "0.00"
     assert span((-0.012, 0.03)) == "−0.012 to 0.030"
+    assert [short(value) for value in (0.01234, 123.4, 12345.6, -999.6, 1.2345e9)] == (
+        ["0.0123", "123", "12346", "−1000", "1.23e+09"]
+    )
     shares = [percent(share) for share in (1.0, 0.3141, 0.00162, 0.0000123, 1e-9, 0.0)]
     assert shares == ["100 %", "31 %", "0.16 %", "0.0012 %", "under 0.001 %", "0 %"]
     assert [probability(value) for value in (0.364, 0.0042, 0.0002)] == ["p = 0.36", "p = 0.0042", "p < 0.001"]

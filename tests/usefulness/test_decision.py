@@ -150,6 +150,14 @@ def test_repeats_of_a_start_that_always_turn_out_alike_make_nobody_surer():
     assert independence(chance_alone, 0).min() > 0.8
 
 
+def test_the_expected_regret_is_within_its_interval_also_where_few_draws_have_any():
+    table = table_of([[0.0, 0.5, 1.0], [2.4, 2.7, 3.4], [0.1, 0.2, 1.1]])
+    found = decided(table, table, [Metric("m")])
+    assert found.expected_regret["A1"] > 0.0
+    for agent, (low, high) in found.regret_interval.items():
+        assert low <= found.expected_regret[agent] <= high
+
+
 @pytest.mark.parametrize("direction", ["max", "min"])
 def test_the_regret_of_an_agent_that_never_succeeded_may_be_all_that_there_is(direction):
     """The uniform prior alone holds that of rates of 1 and 0 after 10 rollouts in half of the cases."""

@@ -92,7 +92,9 @@ def _say_usefulness(result: StudyResult) -> str:
         return f"{score}, better than chance; what a perfect proxy scores is not known.{before}"
     floor = f"a perfect proxy's {in_pairs(level.value, level.low, level.high)}"
     if excess.low > 0.0:
-        lower = f"a perfect proxy scores lower, by {pairs_span(*excess[1:])}"
+        # Rounded down, less than a pair would be none.
+        by = pairs_span(*excess[1:]) if excess.low >= 1.0 else f"at most {ceil(excess.high)}"
+        lower = f"a perfect proxy scores lower, by {by}"
         return f"{score}, {floor}: better than chance, but {lower}.{before}"
     most = ceil(excess.high)
     worse = f"; at most {most} {'pair' if most == 1 else 'pairs'} worse" if most > 0 else ""

@@ -10,10 +10,12 @@ driven twice from the same start, here and in the pre-flight, tells the noise of
 on it.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import product
+from numbers import Real
 
 import numpy as np
 
@@ -123,10 +125,15 @@ class Nominal:
 
 
 def nominal_theta(study: Study) -> Theta | None:
-    """The nominal values of the parameters that are searched; None where the family does not know all of them."""
-    known = getattr(study.family, "nominal", None) or {}
-    names = study.settings.space.names
-    return {name: float(known[name]) for name in names} if set(names) <= set(known) else None
+    """The nominal values of the parameters that are searched; None where the family does not know all of them.
+
+    They are the family's `nominal`; where it has none and follows no model, the neutral values of its parameters.
+    """
+    names, known = study.settings.space.names, getattr(study.family, "nominal", None)
+    if not isinstance(known, Mapping):
+        known = {} if study.settings.proxy else {name: study.family.parameters[name].neutral for name in names}
+    numbers = {name: float(known[name]) for name in names if isinstance(known.get(name), Real)}
+    return numbers if len(numbers) == len(names) and all(map(math.isfinite, numbers.values())) else None
 
 
 def run_nominal(run: StudyRun) -> None:

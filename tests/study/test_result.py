@@ -171,7 +171,6 @@ def test_the_nominal_theta_is_driven_once_beside_the_trials_and_told(finished):
     study = opened(finished)
     assert looked_at(open_study(finished)).nominal is None
     family = SimpleNamespace(**{name: getattr(study.family, name) for name in ("identity", "metrics", "parameters")})
-    assert nominal_theta(replace(study, family=family)) is None
     family.nominal = {"delay": 0.1}
     assert nominal_theta(replace(study, family=family)) is None, "of one parameter nothing is known"
     family.nominal["trim"] = 0
@@ -385,3 +384,16 @@ def test_a_study_can_be_summed_up_from_its_first_trial_on(make_study):
         assert found.knowledge.misfit.fits is None
         assert 0.0 < found.knowledge.posterior.share <= 1.0
         assert found.knowledge.as_good[0] >= 0.0
+
+
+def test_the_nominal_theta_of_a_family_that_tells_none_is_neutral_where_it_follows_no_model(make_study):
+    study = open_study(make_study())
+    neutral = {"trim": 0.0, "delay": 0.0}
+    assert nominal_theta(study) == neutral
+    parameters = {**study.family.parameters, "trim": replace(study.family.parameters["trim"], neutral="wheel_radius")}
+    for nominal, expected in ((None, neutral), ((("trim", 1.0),), neutral), ({"trim": 0.1}, None)):
+        family = SimpleNamespace(parameters=study.family.parameters, nominal=nominal)
+        assert nominal_theta(replace(study, family=family)) == expected
+    assert nominal_theta(replace(study, family=SimpleNamespace(parameters=parameters))) is None
+    held = replace(study.settings, proxy=study.settings.folder / "model.toml")
+    assert nominal_theta(replace(study, settings=held)) is None, "the model may hold others"

@@ -91,9 +91,7 @@ def given_theta(text: str | None, settings: studies.StudySettings, family: Domai
     """θ from NAME=VALUE pairs or a model.toml of the family's robot, else an InputError; none for `nominal`."""
     if text is not None and text.endswith(".toml"):
         studies.check_robot(family, Path(text), option)
-        if (own := getattr(family, "truth", None)) is not None:
-            # A family with parameters that are no effects reads them itself
-            return dict(own(Path(text)))
+        return studies.theta_of_model(family, settings, Path(text), f"{option} {text}")
     return read_theta(text, studies.family_catalogue(family, settings), option)
 
 

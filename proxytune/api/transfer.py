@@ -11,6 +11,7 @@ import pandas as pd
 
 from proxytune import diagnosis
 from proxytune.api.logs import check_no_more_pictures
+from proxytune.domain import DomainFamily
 from proxytune.driving import Robot, catalogue_of, is_robot, read_model_of, read_robot, robot_from_geometry
 from proxytune.effects import Catalogue, Model
 from proxytune.errors import InputError, LogError
@@ -21,7 +22,7 @@ from proxytune.running import watching
 from proxytune.scores import ScoreTable, write_scores
 from proxytune.seeds import target_seed
 from proxytune.settings import GEOMETRY, check_whole
-from proxytune.study import bare_family, cautions_of, measure_agents, read_study_settings
+from proxytune.study import StudySettings, bare_family, cautions_of, measure_agents, read_study_settings
 
 MOST_REPEATS = 1_000_000
 
@@ -180,9 +181,19 @@ def measure(
     if not path.is_file():
         raise InputError(f"--model {path}: no such file; check the path")
     episodes = len(settings.agents) * settings.starts * repeats
-    cautions = cautions_of(bare_family(settings, path))
+    family = bare_family(settings, path)
+    cautions = (*cautions_of(family), *_unread(settings, family, path))
     with watching(progress, episodes) as watcher:
         return Measurement(measure_agents(settings, path, own, watcher, repeats), path, own, repeats, cautions)
+
+
+def _unread(settings: StudySettings, family: DomainFamily, model: Path) -> tuple[str, ...]:
+    """Say so where a model leaves a family's identity, which names all that a result depends on, as without one."""
+    with suppress(InputError):  # Of a family that needs a model
+        if bare_family(settings, None).identity == family.identity:
+            told = f"{settings.family} is the same without it (identity), so its factory reads no value in it"
+            return (f"--model {model}: {told}",)
+    return ()
 
 
 @dataclass(frozen=True, repr=False)

@@ -44,6 +44,7 @@ from .opening import (
     open_settings as open_settings,
     open_study as open_study,
     read_target as read_target,
+    theta_of_model as theta_of_model,
 )
 from .preflight import (
     Preflight as Preflight,

@@ -11,6 +11,7 @@ import itertools
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from numbers import Real
 from pathlib import Path
 from typing import Any
 
@@ -243,7 +244,24 @@ def _truth(settings: StudySettings, family: DomainFamily) -> Theta | None:
         return None
     if not settings.truth.is_file():
         raise settings.error("truth", f"no such file: {settings.truth}; check the path, or remove it")
-    # A family with parameters that are no effects reads them itself
-    own = getattr(family, "truth", None)
-    known = own(settings.truth) if own else read_model(settings.truth, family_catalogue(family, settings)).theta
+    known = theta_of_model(family, settings, settings.truth, f"{settings.path}: truth")
     return {name: known[name] for name in settings.space.names if name in known}
+
+
+def theta_of_model(family: DomainFamily, settings: StudySettings, model: Path, where: str) -> Theta:
+    """θ of a model.toml, as the family's `truth` reads it; of one without it the effects that the file has.
+
+    An InputError if neither reads it, which begins with where it was named.
+    """
+    if (own := getattr(family, "truth", None)) is not None:
+        known = ask(f"truth of {settings.family}", lambda: dict(own(model)))
+        if wrong := [name for name, value in known.items() if not isinstance(value, Real)]:
+            raise InputError(f"{where}: truth of {settings.family} gives no number for '{wrong[0]}'; correct it")
+        return known
+    try:
+        return read_model(model, family_catalogue(family, settings)).theta
+    except InputError as problem:
+        if hasattr(family.parameters, "catalogue"):
+            raise
+        remedy = f"{settings.family} has no method truth(model), so it can hold effects alone: add one that gives θ"
+        raise InputError(f"{where}: {problem}; {remedy}") from None

@@ -77,3 +77,12 @@ def test_repeats_are_labelled_and_one_gives_the_table_of_none_asked_for(measured
 def test_bad_input_is_one_line_and_nothing_is_written(words, refused, tmp_path, name, options, says):
     assert says in refused(*words(name, *options))
     assert not (tmp_path / name).exists()
+
+
+def test_a_model_that_a_family_does_not_follow_is_a_caution(words, answered, make_study, tmp_path):
+    assert answered(*words("one.csv"))["cautions"] == []
+    folder = make_study(family='"deaf:make"')
+    (folder / "deaf.py").write_text("from wobbly import Wobbly\n\n\ndef make(domain, *, model):\n    return Wobbly()\n")
+    words = ("measure", folder, "--model", tmp_path / "model.toml", "--output", tmp_path / "two.csv")
+    (line,) = answered(*words)["cautions"]
+    assert "model.toml: deaf:make is the same without it (identity), so its factory reads no value in it" in line

@@ -7,6 +7,7 @@ import pytest
 from one_line import complaint_of
 from searched import run
 
+from proxytune.api import drive
 from proxytune.errors import InputError
 from proxytune.report.study.page import usefulness_table
 from proxytune.storage import Store
@@ -270,3 +271,41 @@ def test_targets_of_several_files_and_names_are_as_one_and_where_none_agrees_a_t
 )
 def test_a_target_of_another_kind_or_none_is_refused(make_study, target, says):
     assert says in complaint_of(open_study, make_study(target=target))
+
+
+READS = """
+from pathlib import Path
+
+from wobbly import Wobbly, wobbly
+
+
+class Reads(Wobbly):
+    def truth(self, model):
+        return {"trim": float(Path(model).read_text()), "else": VALUE}
+
+
+def make(domain, *, model):
+    return Reads()
+"""
+
+
+def test_the_truth_of_a_family_of_one_s_own_is_what_its_method_reads_and_without_one_that_is_said(make_study):
+    folder = make_study(truth='"truth.toml"')
+    (folder / "truth.toml").write_text("trim = 0.1\n")
+    told = complaint_of(open_study, folder)
+    assert "study.toml: truth: " in told
+    assert "truth.toml: trim: unknown key" in told
+    assert "wobbly:wobbly has no method truth(model), so it can hold effects alone: add one that gives θ" in told
+    told = complaint_of(drive, folder, "agent0", str(folder / "truth.toml"))
+    assert told.startswith("theta ")
+    assert "wobbly:wobbly has no method truth(model)" in told
+    for number, (value, expected) in enumerate({"2": None, "'high'": "gives no number for 'else'"}.items()):
+        folder = make_study(truth='"truth.txt"', family=f'"reads_{number}:make"')
+        (folder / f"reads_{number}.py").write_text(READS.replace("VALUE", value))
+        (folder / "truth.txt").write_text("0.1")
+        if expected:
+            assert expected in complaint_of(open_study, folder)
+        else:
+            assert open_study(folder).truth == {"trim": 0.1}
+    (folder / "truth.txt").write_text("no number")
+    assert "truth of reads_1:make raised ValueError" in complaint_of(open_study, folder)

@@ -114,7 +114,7 @@ class Measurement:
         model: The model.toml of the domain.
         seed: Seed of the episodes.
         repeats: Episodes from every start.
-        cautions: What is probably not meant in the model or the robot, a sentence each.
+        cautions: What is probably not meant in the model or the robot, and metrics left out, a sentence each.
     """
 
     scores: ScoreTable
@@ -182,9 +182,10 @@ def measure(
         raise InputError(f"--model {path}: no such file; check the path")
     episodes = len(settings.agents) * settings.starts * repeats
     family = bare_family(settings, path)
-    cautions = (*cautions_of(family), *_unread(settings, family, path))
+    cautions = [*cautions_of(family), *_unread(settings, family, path)]
     with watching(progress, episodes) as watcher:
-        return Measurement(measure_agents(settings, path, own, watcher, repeats), path, own, repeats, cautions)
+        scores = measure_agents(settings, path, own, watcher, repeats, cautions.append)
+    return Measurement(scores, path, own, repeats, tuple(cautions))
 
 
 def _unread(settings: StudySettings, family: DomainFamily, model: Path) -> tuple[str, ...]:

@@ -102,7 +102,7 @@ class _Closing:
     def _measure(self, settings: StudySettings, output: Path) -> None:
         assert self.loop.twin is not None
         with self.teller.episodes(len(settings.agents) * settings.starts) as watcher:
-            scores = measure_agents(settings, self.loop.twin, target_seed(settings.seed), watcher)
+            scores = measure_agents(settings, self.loop.twin, target_seed(settings.seed), watcher, warn=self.teller.say)
         self.episodes += len(settings.agents) * settings.starts
         write_scores(scores, output)
 

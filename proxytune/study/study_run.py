@@ -394,12 +394,20 @@ def with_spending(study: Study, *, budget: int | None = None, jobs: int | None =
     return replace(study, settings=spending)
 
 
-def measure_agents(settings: StudySettings, model: Path, seed: int, watcher: Watcher, repeats: int = 1) -> ScoreTable:
+def measure_agents(
+    settings: StudySettings,
+    model: Path,
+    seed: int,
+    watcher: Watcher,
+    repeats: int = 1,
+    warn: Callable[[str], None] = lambda _: None,
+) -> ScoreTable:
     """Score the study's agents over its starts in the domain that a model describes.
 
-    Every metric of the family is kept that all episodes have. Rows are in the order of the study's agents and starts,
-    whatever the number of jobs: the same model, settings and seed give the same table. Of several repeats, each has
-    placement noise of its own, and episodes are labelled START/REPEAT; the first repeat is what a single one would be.
+    Every metric of the family is kept that all episodes have; `warn` hears of any other. Rows are in the order of the
+    study's agents and starts, whatever the number of jobs: the same model, settings and seed give the same table. Of
+    several repeats, each has placement noise of its own, and episodes are labelled START/REPEAT; the first repeat is
+    what a single one would be.
 
     Raises:
         InputError: If the settings, the model or the family cannot be used.
@@ -428,5 +436,8 @@ def measure_agents(settings: StudySettings, model: Path, seed: int, watcher: Wat
             left[agent] -= 1
             if not left[agent]:
                 watcher.finished(f"agent {agent} measured")
+    for name in family.metrics:
+        if missing := sum(name not in scores for scores in metrics.values()):
+            warn(f"{name}: missing in {missing} of {len(metrics)} episodes, left out of the table")
     scored = {(episode.agent, label): metrics[episode] for episode, label in labels.items()}
     return ScoreTable.from_episodes(_in_common(scored))

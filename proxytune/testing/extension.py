@@ -21,6 +21,7 @@ from proxytune.driving import NEEDS, Agent, GroundPlaneCamera, Picture, Robot, d
 from proxytune.errors import EpisodeError, InputError
 from proxytune.running import working
 from proxytune.scores import Metric, ScoreTable
+from proxytune.settings import nearest
 from proxytune.space import Interval, Parameter, Space, Theta
 from proxytune.testing.effect import ROBOT, ask, claim, claim_members
 from proxytune.usefulness import ALL, Measure, Measured, assess
@@ -191,20 +192,28 @@ NOBODY = "nobody drives like this"
 STARTS = 3
 """A parameter has to change something from one of the first so many starts."""
 Scores = Mapping[str, float]
+ScoresOf = Callable[[Episode], Scores]
 
 
-def check_family(family: DomainFamily, *, agents: Sequence[str], without_effect: Collection[str] = ()) -> None:
+def check_family(
+    family: DomainFamily,
+    *,
+    agents: Sequence[str],
+    without_effect: Collection[str] = (),
+    compared: Collection[str] | None = None,
+) -> None:
     """Refuse a domain family that breaks a promise.
 
     It can be pickled; the same episode has the same result, after other episodes, in another process and, where it has
     `run_many`, beside others too; each parameter changes a metric of some agent, or is named as one that does not;
-    metrics are those that it declares, all finite; its identity stays the same; and an agent that it does not know is
-    refused.
+    metrics are those that it declares, finite where agents are compared by them; its identity stays the same; and an
+    agent that it does not know is refused.
 
     Args:
         family: The family.
         agents: Names of agents that drive in it.
         without_effect: Parameters that change no metric of these agents, as one that only shapes another.
+        compared: The metrics that studies compare agents by, all if not given; any other may be missing or NaN.
 
     Raises:
         ConformanceError: With the promise that is broken.
@@ -212,18 +221,22 @@ def check_family(family: DomainFamily, *, agents: Sequence[str], without_effect:
     what = f"family {type(family).__name__}"
     claim_members(family, what, MEMBERS)
     _claim_declared(family, what)
+    needed = list(family.metrics if compared is None else compared)
+    for name in needed:
+        claim(name in family.metrics, f"{what} has no metric '{name}'; {nearest(name, family.metrics)}")
+    scores_of = functools.partial(_scores, family, what, needed)
     for agent in agents:
         ask(f"check_agent('{agent}') of {what}", functools.partial(family.check_agent, agent))
     _claim_unknown(family, what)
     tried = make_episode({}, agent=agents[0], start=0, seed=1)
-    before, identity = _scores(family, what, tried), family.identity
+    before, identity = scores_of(tried), family.identity
     for name in family.parameters:
-        _claim_moves(family, what, agents, name, may_rest=name in without_effect)
-    claim(_scores(family, what, tried) == before, f"{what} scores an episode otherwise after others; keep no state")
+        _claim_moves(family, what, scores_of, agents, name, may_rest=name in without_effect)
+    claim(scores_of(tried) == before, f"{what} scores an episode otherwise after others; keep no state")
     claim(family.identity == identity, f"{what} has another identity after episodes; it must not depend on them")
     _claim_elsewhere(family, what, tried, before)
     if hasattr(family, "run_many"):
-        _claim_together(family, what, agents)
+        _claim_together(family, what, scores_of, agents)
 
 
 def _claim_declared(family: Any, what: str) -> None:
@@ -249,26 +262,33 @@ def _claim_unknown(family: DomainFamily, what: str) -> None:
     claim(False, f"{what} {line}")
 
 
-def _scores(family: DomainFamily, what: str, episode: Episode) -> Scores:
-    """The metrics of an episode, which are those declared."""
+def _scores(family: DomainFamily, what: str, needed: Sequence[str], episode: Episode) -> Scores:
+    """The finite metrics of an episode, which are declared, and those needed among them."""
     at = f"{what}, agent '{episode.agent}', start {episode.start}, θ {dict(episode.theta)}"
-    scores = ask(at, lambda: family.run(episode))
-    for name in family.metrics:
-        claim(name in scores, f"{at}: gives no '{name}', which its metrics declare")
-        claim(math.isfinite(scores[name]), f"{at}: gives '{name}' {scores[name]}; it must be finite")
+    scores, remedy = ask(at, lambda: family.run(episode)), "or leave it out of `compared`, the metrics of studies"
+    for name in needed:
+        claim(name in scores, f"{at}: gives no '{name}', which its metrics declare; give it, {remedy}")
+        claim(math.isfinite(scores[name]), f"{at}: gives '{name}' {scores[name]}; make it finite, {remedy}")
     undeclared = sorted(set(scores) - set(family.metrics))
     claim(not undeclared, f"{at}: gives '{''.join(undeclared[:1])}', which its metrics do not declare")
-    return dict(scores)
+    return _finite(scores)
 
 
-def _claim_moves(family: DomainFamily, what: str, agents: Sequence[str], name: str, *, may_rest: bool) -> None:
+def _finite(scores: Scores) -> Scores:
+    """The scores without those that are missing, as a study keeps them."""
+    return {name: value for name, value in scores.items() if math.isfinite(value)}
+
+
+def _claim_moves(
+    family: DomainFamily, what: str, scores_of: ScoresOf, agents: Sequence[str], name: str, *, may_rest: bool
+) -> None:
     """A parameter makes a difference at one end of its range, for some agent from some start."""
     parameter = family.parameters[name]
     instances: tuple[Theta, ...] = {}, {name: parameter.low}, {name: parameter.high}
     for start in range(min(family.starts, STARTS)):
         for agent in agents:
             episodes = (make_episode(theta, agent=agent, start=start, seed=1) for theta in instances)
-            nominal, *moved = (_scores(family, what, episode) for episode in episodes)
+            nominal, *moved = map(scores_of, episodes)
             if any(scores != nominal for scores in moved):
                 return
     line = f"scores all the same with '{name}' left out, {parameter.low:g} and {parameter.high:g}"
@@ -291,20 +311,20 @@ def _claim_elsewhere(family: DomainFamily, what: str, episode: Episode, scores: 
     return None
 
 
-def _claim_together(family: Any, what: str, agents: Sequence[str]) -> None:
+def _claim_together(family: Any, what: str, scores_of: ScoresOf, agents: Sequence[str]) -> None:
     """Episodes at once score as each does by itself."""
     starts = range(min(family.starts, STARTS))
     episodes = [make_episode({}, agent=agent, start=start, seed=1) for agent in agents for start in starts]
     together = list(ask(f"run_many of {what}", lambda: family.run_many(episodes)))
     claim(len(together) == len(episodes), f"{what}: run_many of {len(episodes)} episodes gives {len(together)} results")
     for episode, scores in zip(episodes, together, strict=True):
-        same = not isinstance(scores, EpisodeError) and dict(scores) == _scores(family, what, episode)
+        same = not isinstance(scores, EpisodeError) and _finite(scores) == scores_of(episode)
         line = f"scores agent '{episode.agent}', start {episode.start} otherwise beside others; mix nothing"
         claim(same, f"{what} {line}")
 
 
 def _answer(family: DomainFamily, episode: Episode) -> tuple[str, Scores]:
-    return family.identity, dict(family.run(episode))
+    return family.identity, _finite(family.run(episode))
 
 
 METRICS = (Metric("distance"), Metric("deviation", "min", 0.1))

@@ -2,6 +2,7 @@ import shutil
 
 import pytest
 
+from proxytune.cli.main import main
 from proxytune.files import shipped
 from proxytune.scores import read_scores
 
@@ -86,3 +87,14 @@ def test_a_model_that_a_family_does_not_follow_is_a_caution(words, answered, mak
     words = ("measure", folder, "--model", tmp_path / "model.toml", "--output", tmp_path / "two.csv")
     (line,) = answered(*words)["cautions"]
     assert "model.toml: deaf:make is the same without it (identity), so its factory reads no value in it" in line
+
+
+def test_a_metric_that_episodes_lack_is_left_out_of_the_table_and_said(make_study, answered, tmp_path, capsys):
+    folder = make_study(metrics='["survival_time:max"]', domain={"faults": '["agent0:*:nan", "agent1:2:nan"]'})
+    (tmp_path / "model.toml").write_text("trim = 0.1\n")
+    words = ("measure", folder, "--model", tmp_path / "model.toml", "--output", tmp_path / "one.csv")
+    line = "distance: missing in 4 of 18 episodes, left out of the table"
+    assert answered(*words)["cautions"] == [line]
+    assert main([*map(str, words)]) == 0
+    assert f"beware: {line}\n" in capsys.readouterr().out
+    assert (tmp_path / "one.csv").read_text().startswith("agent,episode,survival_time\n")

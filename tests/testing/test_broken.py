@@ -265,8 +265,8 @@ class Unpicklable(Wobbly):
 
 BROKEN_FAMILIES = {
     "an undeclared metric": (Altered(extra=("height",)), "gives 'height', which its metrics do not declare"),
-    "a missing metric": (Altered(missing="distance"), "gives no 'distance', which its metrics declare"),
-    "a metric that is no number": (Wobbly(faults=("agent0:*:nan",)), "gives 'distance' nan; it must be finite"),
+    "a missing metric": (Altered(missing="distance"), "gives no 'distance', which its metrics declare; give it"),
+    "a metric that is no number": (Wobbly(faults=("agent0:*:nan",)), "gives 'distance' nan; make it finite"),
     "an idle parameter": (Altered(idle="trim"), "scores all the same with 'trim' left out, -0.3 and 0.3; use it"),
     "chance": (Altered(chance=True), "scores an episode otherwise after others; keep no state"),
     "an identity of the process": (ByProcess(), "has the identity 'of .*' in another process, 'of .*' here"),
@@ -281,6 +281,14 @@ BROKEN_FAMILIES = {
 def test_a_family_that_keeps_every_promise_passes_also_with_a_parameter_that_is_said_to_do_nothing():
     assert check_family(Wobbly(), agents=["agent0"]) is None
     assert check_family(Altered(idle="trim"), agents=["agent0"], without_effect=["trim"]) is None
+
+
+def test_a_metric_that_no_study_compares_by_may_be_missing_or_nan():
+    for family in (Wobbly(faults=("agent0:*:nan",)), Altered(missing="distance")):
+        assert check_family(family, agents=["agent0"], compared=["survival_time"]) is None
+        refused(check_family, family, "or leave it out of `compared`", agents=["agent0"], compared=["distance"])
+    unknown = "has no metric 'distanc'; did you mean 'distance'"
+    refused(check_family, Wobbly(), unknown, agents=["agent0"], compared=["distanc"])
 
 
 class Mixing(Convoy):

@@ -160,7 +160,7 @@ class Measurement:
 def measure(
     study: str | Path, model: str | Path, *, repeats: int = 1, seed: int | None = None, progress: bool = False
 ) -> Measurement:
-    """Drive a study's agents in the domain of a model file.
+    """Drive a study's agents, and those that it holds out by name, in the domain of a model file.
 
     Args:
         study: The study's folder, or its study.toml, for its agents, starts and [domain].
@@ -180,6 +180,7 @@ def measure(
         raise InputError(f"--repeats must be between 1 and {MOST_REPEATS}, got {repeats}")
     if not path.is_file():
         raise InputError(f"--model {path}: no such file; check the path")
+    settings = replace(settings, agents=tuple(dict.fromkeys((*settings.agents, *settings.held_out))))
     episodes = len(settings.agents) * settings.starts * repeats
     family = bare_family(settings, path)
     cautions = [*cautions_of(family), *_unread(settings, family, path)]

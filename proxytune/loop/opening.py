@@ -24,7 +24,6 @@ from proxytune.report import write_text
 from proxytune.running import Silent, Watcher
 from proxytune.scores import ScoreTable, read_scores
 from proxytune.seeds import fresh_seed
-from proxytune.settings import read_settings
 from proxytune.space import Theta
 from proxytune.storage import Store, locked
 from proxytune.usefulness import Assessment, assess, floor_of_repeats
@@ -40,8 +39,7 @@ def held_out_of(settings: study.StudySettings, family: DomainFamily, *, driven: 
     Where the target is not driven, only agents that its table has can be held out. One that study.toml names is refused
     if it is tuned on, or has no rank.
     """
-    named = read_settings(settings.path).texts(KEY, ())
-    scored = scored_agents(settings)
+    named, scored = settings.held_out, scored_agents(settings)
     used = {*settings.agents, *settings.loaded_agents}
     for name in named:
         if name in used:

@@ -106,7 +106,8 @@ def _check(settings: StudySettings, family: DomainFamily) -> None:
         try:
             ask(f"check_agent('{name}') of {settings.family}", functools.partial(family.check_agent, name))
         except InputError as problem:
-            key = f"agents.{agent}" if settings.aliases else "agents"
+            key = f"agents.{agent}" if agent in settings.aliases else "agents"
+            key = "held_out" if agent in settings.held_out else key
             raise settings.error(key, str(problem)) from None
 
 

@@ -36,7 +36,7 @@ def with_scores(settings: StudySettings) -> tuple[StudySettings, tuple[str, ...]
     scored = _read(settings, settings.metric_names).agents
     there = tuple(agent for agent in settings.agents if agent in scored)
     missing = [agent for agent in settings.agents if agent not in scored]
-    beyond = [agent for agent in scored if agent not in settings.agents]
+    beyond = [agent for agent in scored if agent not in (*settings.agents, *settings.held_out)]
     if len(there) < 2:
         files = ", ".join(map(str, settings.targets))
         raise InputError(f"{files}: has no scores of {', '.join(missing)}; {_remedy(missing, beyond)}")

@@ -179,6 +179,7 @@ class StudySettings:
     learn_from: tuple[str, ...] = ()  # where trials are known from before the first, as study.toml has it
     low_fidelity: tuple[str, ...] = ()  # such of a cheaper proxy, to whose outputs differences are modelled
     target_columns: Mapping[str, str] = field(default_factory=dict)  # other names of columns in the target's files
+    held_out: tuple[str, ...] = ()  # agents that no tuning sees, by which `loop` compares proxies, where it names them
     episode_timeout_s: float | None = None  # how long an episode may take before it counts as failed [s], if limited
     families: Mapping[str, "StudySettings"] = field(default_factory=dict)  # the same study by each of its families
     family_name: str = ""  # which of several it is of; empty if there is but one
@@ -323,6 +324,7 @@ def _settings(read: Section) -> StudySettings:
         learn_from=read.texts("learn_from", ()),
         low_fidelity=low_fidelity,
         target_columns=texts_of(read.section("target_columns")),
+        held_out=read.texts("held_out", ()),
         episode_timeout_s=positive(read, "episode_timeout_s"),
     )
 

@@ -5,6 +5,7 @@ import pytest
 from proxytune.cli.main import main
 from proxytune.files import shipped
 from proxytune.scores import read_scores
+from proxytune.study import open_study
 
 
 @pytest.fixture
@@ -98,3 +99,15 @@ def test_a_metric_that_episodes_lack_is_left_out_of_the_table_and_said(make_stud
     assert main([*map(str, words)]) == 0
     assert f"beware: {line}\n" in capsys.readouterr().out
     assert (tmp_path / "one.csv").read_text().startswith("agent,episode,survival_time\n")
+
+
+def test_agents_that_a_study_holds_out_are_measured_too_and_no_news_to_it(make_study, answered, refused, tmp_path):
+    changes = {"agents": '["agent0", "agent1", "agent2"]', "held_out": '["agent4", "agent5", "agent3"]'}
+    folder, model = make_study(**changes), tmp_path / "model.toml"
+    model.write_text("trim = 0.1\n")
+    words = ("measure", folder, "--model", model, "--output", folder / "target.csv")
+    assert answered(*words)["agents"] == ["agent0", "agent1", "agent2", "agent4", "agent5", "agent3"]
+    study = open_study(folder)
+    assert (study.settings.agents, study.cautions) == (("agent0", "agent1", "agent2"), ())
+    make_study(**{**changes, "held_out": '["agent4", "nobody"]'})
+    assert "study.toml: held_out: no agent 'nobody'" in refused(*words)

@@ -167,3 +167,24 @@ def test_the_entry_points_of_the_page_are_listed_as_plug_ins(everything, answere
     for kind, name in {"effect": "weak_reverse", "agent": "grey", "engine": "halton", "measure": "worst"}.items():
         rows = answered("list", f"{kind}s")[f"{kind}s"]
         assert name in [row.get(kind, row.get("key" if kind == "measure" else "name")) for row in rows]
+    agents, learners, families = (
+        {row["name"]: row for row in answered("list", kind)[kind]} for kind in ("agents", "learners", "families")
+    )
+    assert agents["grey"]["how_it_drives"] == "Turns away from the brighter half of what it sees."
+    assert learners["nearest"]["how_it_learns"].startswith("Does what the expert did at the most similar picture")
+    assert families["swinging"]["what_it_simulates"].startswith("Called with the study's [domain] table")
+    assert {"proxytune.driving.family:lane_following", "swinging"} < set(families)
+
+
+def test_one_s_own_is_told_by_list_as_module_and_attribute(everything, monkeypatch, answered, capsys, refused):
+    monkeypatch.chdir(everything)
+    assert answered("list", "effects", "weak_reverse:WeakReverse")["effects"][0]["high"] == 0.9
+    assert main(["list", "effects", "weak_reverse:WeakReverse"]) == 0
+    assert capsys.readouterr().out.startswith("weak_reverse:WeakReverse: The robot is slower backwards than forwards.")
+    named = {"agents": "grey:Grey", "engines": "my_engine:HALTON", "learners": "nearest:Nearest"}
+    for kind, name in named.items():
+        assert [row["name"] for row in answered("list", kind, name)[kind]] == [name]
+    (row,) = answered("list", "measures", "my_measures:WORST")["measures"]
+    assert (row["key"], row["name"]) == ("my_measures:WORST", "Worst")
+    assert "effect 'weak_reverse:Weak': weak_reverse has no 'Weak'" in refused("list", "effects", "weak_reverse:Weak")
+    assert "list robots: no 'grey:Grey'" in refused("list", "robots", "grey:Grey")

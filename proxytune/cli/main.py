@@ -108,7 +108,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     arguments = parse(words)
     command = COMMANDS[arguments.command]
     # Of effects that are typed the code is asked for; what a file names is another's wish
-    typed = names_in(getattr(arguments, "effects", ""))
+    listed = getattr(arguments, "name", None) if arguments.command == "list" else None
+    typed = (*names_in(getattr(arguments, "effects", "")), *names_in(listed or ""))
     with nullcontext() if command.runs_code else running_none(arguments.command, typed):
         run, program = (lambda: command.load()(arguments)), f"proxytune {arguments.command}"
         return run_command(run, arguments, program=program, left=command.left)

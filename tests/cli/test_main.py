@@ -55,7 +55,7 @@ def test_a_library_that_stumbles_over_too_few_descriptors_is_one_line(failing, c
         main(["list", "robots"])
 
 
-@pytest.mark.parametrize("kind", ["robots", "maps", "effects", "agents", "metrics", "engines", "measures"])
+@pytest.mark.parametrize("kind", listing._KINDS)
 def test_json_is_one_document_and_nothing_else(kind, capsys):
     assert main(["list", kind, "--json"]) == 0
     out = capsys.readouterr()

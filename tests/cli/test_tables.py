@@ -3,6 +3,7 @@
 import pytest
 from readable import on_terminal
 
+from proxytune.cli import listing
 from proxytune.cli.main import COMMANDS, parser
 from proxytune.report import Table, columns_of, table_text
 
@@ -31,7 +32,7 @@ def shown(*words):
     return COMMANDS[words[0]].load()(parser(list(map(str, words))).parse_args(list(map(str, words)))).text
 
 
-@pytest.mark.parametrize("kind", ["robots", "maps", "effects", "agents", "metrics", "engines", "measures"])
+@pytest.mark.parametrize("kind", listing._KINDS)
 def test_lists_are_whole(kind):
     assert_whole(shown("list", kind))
 

@@ -6,7 +6,7 @@
 import inspect
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -103,6 +103,7 @@ def tune(
     space, compared = box_space(box), [metrics] if isinstance(metrics, str) else list(metrics)
     with temporary_folder() if folder is None else nullcontext(Path(folder)) as home, _written(home, scores) as target:
         table = read_scores(target, [Metric.parse(one).name for one in compared], columns=columns)
+        _check_agents(simulator, agents)
         names = tuple(agents) if agents else table.agents
         simulate: Any = simulator
         if agents:  # Gymnasium is loaded for environments alone
@@ -111,6 +112,7 @@ def tune(
             simulate = played_environment(simulator, space, agents, domain or {}, home / FILE_NAME)
         if not callable(simulate):
             raise InputError(f"simulator: {simulate!r} is no function; an environment needs agents={{name: policy}}")
+        _check_takes(simulate)
         counted = int(table.counts.max()) if "start" in _arguments(simulate) else 1
         if repeated := starts is None and counted < table.counts.max():
             target = home / "target.csv"
@@ -139,6 +141,29 @@ def tune(
         units = {one.name: "" for one in settings.metrics}
         study = open_settings(settings, GivenFamily(simulate, own, units, names, settings.starts, identity))
         return run_quietly(study, progress, _known(study, known))
+
+
+def _check_agents(simulator: Any, agents: Any) -> None:
+    """Refuse agents that are no policies by name, or that are given with a function."""
+    if not agents:
+        return
+    if callable(simulator) and {"theta", "agent"} <= _arguments(simulator):
+        raise InputError("agents: are policies of a Gymnasium environment; of a function leave it out")
+    if not isinstance(agents, Mapping):
+        told = "are policies of a Gymnasium environment by name; of a function leave it out"
+        raise InputError(f"agents: {told}, got a {type(agents).__name__}")
+
+
+def _check_takes(simulate: Simulate) -> None:
+    """Refuse a function that cannot be called as `GivenFamily.run` does."""
+    with suppress(ValueError):  # Of some nobody says what they take
+        signature = inspect.signature(simulate)
+        named = {"start", "seed"} & set(signature.parameters)
+        try:
+            signature.bind({}, "agent", **dict.fromkeys(named, 0))
+        except TypeError:
+            wanted = "the function must take (theta, agent), or (theta, agent, start, seed)"
+            raise InputError(f"simulator: {wanted}, and takes {signature}") from None
 
 
 def _as_repeats(table: ScoreTable) -> pd.DataFrame:

@@ -65,8 +65,8 @@ def _known_effects(own: Names = ()) -> Mapping[Catalogue, Sequence[str]]:
     if own:
         return {Catalogue(Path.cwd()): own}
     cars = Catalogue(drive="ackermann")
-    own = [name for name, effect in cars.shipped.items() if SHIPPED.shipped.get(name) is not effect]
-    return {SHIPPED: SHIPPED.names, cars: own}
+    of_cars = [name for name, effect in cars.shipped.items() if SHIPPED.shipped.get(name) is not effect]
+    return {SHIPPED: SHIPPED.names, cars: of_cars}
 
 
 def _effect_text(name: str, own: Names) -> Group:

@@ -120,6 +120,13 @@ def test_a_function_of_theta_and_agent_with_one_score_is_enough():
         ({"known": [{"gain": 1.0}]}, "known: row 0: has no 'drag'; give each parameter of the box"),
         ({"known": rows(TRUE, 1, **TRUE).replace("a", "z")}, "known: row 0: is no episode of this study"),
         ({"simulator": "Pendulum-v1"}, "an environment needs agents={name: policy}"),
+        ({"agents": ["a", "bb"]}, "agents: are policies of a Gymnasium environment; of a function leave it out"),
+        ({"agents": {"a": "zero"}}, "agents: are policies of a Gymnasium environment; of a function leave it out"),
+        ({"agents": ["zero"], "simulator": "Pendulum-v1"}, "by name; of a function leave it out, got a list"),
+        (
+            {"simulator": lambda theta: 1.0},
+            "simulator: the function must take (theta, agent), or (theta, agent, start, seed), and takes (theta)",
+        ),
     ],
 )
 def test_what_cannot_be_used_is_one_line(options, said):

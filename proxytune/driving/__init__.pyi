@@ -15,7 +15,12 @@ from .episode import (
     start_pose as start_pose,
 )
 from .expert import Expert as Expert
-from .family import LaneFollowing as LaneFollowing, lane_following as lane_following, mounted_camera as mounted_camera
+from .family import (
+    DOMAIN_KEYS as DOMAIN_KEYS,
+    LaneFollowing as LaneFollowing,
+    lane_following as lane_following,
+    mounted_camera as mounted_camera,
+)
 from .fleet import Plants as Plants, Rollouts as Rollouts, drive as drive, follow as follow
 from .lane import lane_length as lane_length, lane_point as lane_point, lane_pose as lane_pose, off_map as off_map
 from .maps import map_names as map_names, read_map as read_map, shipped_map as shipped_map

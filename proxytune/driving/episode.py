@@ -200,6 +200,10 @@ def _ask_together(act: Callable[[list[Any]], Any], memories: list[Any]) -> tuple
     return (commands, kept) if sound else None
 
 
+TWO = "a command is two duties, left and right, or a car's throttle and steering"
+"""What an answer must be."""
+
+
 def ask(driver: Driver, seen: Any, memory: Any, time_s: float) -> tuple[Command, Any]:
     """A driver's next command and memory; refused, with the time [s], where it raises or these are none."""
     try:
@@ -210,15 +214,15 @@ def ask(driver: Driver, seen: Any, memory: Any, time_s: float) -> tuple[Command,
 
 
 def command_of(answer: Any, time_s: float) -> Command:
-    """An answer as a command; refused, with the time [s], where it is not two finite duties."""
+    """An answer as a command; refused, with the time [s], where it is not two finite numbers."""
     try:
         command = np.asarray(answer, dtype=float)
     except Exception as problem:
         told = f"answered with a {type(answer).__name__} at {time_s:.2f} s: {problem}"
-        raise EpisodeError(f"{told}; a command is two duties, left and right") from problem
+        raise EpisodeError(f"{told}; {TWO}") from problem
     if command.shape != (2,):
         told = f"answered with shape {command.shape} at {time_s:.2f} s"
-        raise EpisodeError(f"{told}; a command is two duties, left and right")
+        raise EpisodeError(f"{told}; {TWO}")
     if not (math.isfinite(command[0]) and math.isfinite(command[1])):
         raise EpisodeError(f"answered {command.tolist()} at {time_s:.2f} s; duties must be finite")
     return command

@@ -309,6 +309,10 @@ def _instance(family: LaneFollowing, theta: tuple[tuple[str, float], ...], colum
     return Instance(robot, drivetrain(robot, effects), camera, image, measurement)
 
 
+DOMAIN_KEYS = ("robot", "plant", "camera", "map", "seconds", "position_noise_m", "heading_noise_deg", "effects")
+"""What a study's `[domain]` table may say of it."""
+
+
 def lane_following(section: Section, *, model: Path | None) -> LaneFollowing:
     """The family that a study's `[domain]` table describes.
 
@@ -319,7 +323,7 @@ def lane_following(section: Section, *, model: Path | None) -> LaneFollowing:
     Raises:
         SettingsError: With file, key and remedy.
     """
-    section.only(("robot", "plant", "camera", "map", "seconds", "position_noise_m", "heading_noise_deg", "effects"))
+    section.only(DOMAIN_KEYS)
     folder = section.path.resolve().parent
     given = read_model_of(model, folder) if model else None
     robot = _agreed(section, "robot", given.robot if given else None, "duckiebot")

@@ -4,6 +4,7 @@
 camera's picture beside the map from above with the robot's way.
 """
 
+import difflib
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -71,7 +72,11 @@ def read_theta(given: Mapping[str, Any], known: Mapping[str, Parameter]) -> dict
 
 def _interval(name: str, value: Any, known: Mapping[str, Parameter]) -> ValueRange:
     if name not in known:
-        raise InputError(f"theta: unknown parameter '{name}'; {parameter_hint(name, known)}")
+        hint = parameter_hint(name, known)
+        if hint.startswith("known are"):  # Seventy names are no hint
+            alike = ", ".join(difflib.get_close_matches(name, list(known), cutoff=0.0))
+            hint = f"nearest are {alike}; `python -m proxytune list effects` has all"
+        raise InputError(f"theta: unknown parameter '{name}'; {hint}")
     parameter, ends = known[name], _numbers(value)
     if len(ends) not in (1, 2) or not all(math.isfinite(end) for end in ends):
         raise InputError(f"theta: {name} must be a finite number or [low, high], got {value!r}")
@@ -132,6 +137,8 @@ class Tally:
 
 OPTIONS = ("theta", "start", "episode_seed")
 """What `reset` may be told of the episode."""
+OWN_KEYS = ("theta", "start", "model", "folder", "render_mode")
+"""What the environment may be told besides the keys of a `[domain]` table."""
 SEEDS = 2**32
 """How many seeds of episodes there are, as in a study."""
 
@@ -187,6 +194,7 @@ class LaneFollowingEnv(gymnasium.Env[driving.Picture, NDArray[Any]]):
     ) -> None:
         plain = {key: str(value) if isinstance(value, Path) else value for key, value in domain.items()}
         table = Section(Path(folder) / LaneFollowingEnv.__name__, "", plain)
+        table.only((*driving.DOMAIN_KEYS, *OWN_KEYS))
         self.family = driving.lane_following(table, model=Path(model) if model else None)
         self._theta = read_theta(theta or {}, self.family.parameters)
         self._start = None if start is None else _whole("start", start, self.family.starts)

@@ -50,7 +50,8 @@ def check_agent(agent: Agent | type[Agent], *, robot: Robot | None = None) -> No
     alone = _driven(made, what, robot, seen)
     for tick, command in enumerate(alone):
         told = f"{what} answers picture {tick} with {command.tolist()}"
-        claim(command.shape == (2,), f"{told}; a command is two duties, left and right")
+        two = "a command is two duties, left and right, or a car's throttle and steering"
+        claim(command.shape == (2,), f"{told}; {two}")
         claim(np.isfinite(command).all() and np.abs(command).max() <= 1.0, f"{told}; duties lie within [-1, 1]")
     again = _driven(made, what, robot, seen)
     claim(np.array_equal(alone, again), f"{what} drives otherwise the second time; keep all it learns in its memory")

@@ -72,7 +72,7 @@ def test_another_seed_puts_the_robot_down_elsewhere_and_it_drives_until_its_time
     [
         ("raises", "raised ValueError at 0.50 s: lost"),
         ("nan", "answered [nan, 0.1] at 0.50 s; duties must be finite"),
-        ("three", "answered with shape (3,) at 0.50 s; a command is two duties, left and right"),
+        ("three", "answered with shape (3,) at 0.50 s; a command is two duties, left and right, or a car's thro"),
         ("word", "answered with a str at 0.50 s: could not convert string to float: 'left'; a command is two duties"),
         ("beginner", "raised RuntimeError before the first picture: no map"),
     ],

@@ -241,8 +241,11 @@ def test_worlds_and_cameras_of_many_theta_do_not_pile_up_and_closing_twice_does_
     [
         ({"plant": "bulet"}, "plant: unknown value 'bulet'; did you mean 'bullet'?"),
         ({"robott": "duckiebot"}, "robott: unknown key; did you mean 'robot'?"),
+        ({"foo": 1}, "foo: unknown key; known are: camera, effects, folder, heading_noise_deg, map, model, plant,"),
         ({"map": "big_loop"}, "map: unknown value 'big_loop'"),
         ({"theta": {"trimm": 0.1}}, "theta: unknown parameter 'trimm'; did you mean 'trim'?"),
+        ({"theta": {"mass": 1.0}}, "unknown parameter 'mass'; nearest are "),
+        ({"theta": {"mass": 1.0}}, "; `python -m proxytune list effects` has all"),
         ({"theta": {"trim": 5.0}}, "theta: trim must lie within [-0.5, 0.5], got 5.0"),
         ({"theta": {"trim": [0.2, 0.1]}}, "theta: trim: the lower bound must come first, got [0.2, 0.1]"),
         ({"theta": {"trim": "left"}}, "theta: trim must be a finite number or [low, high], got 'left'"),
@@ -276,7 +279,7 @@ def test_an_action_that_is_no_command_is_refused_with_its_time_and_a_step_withou
     env.step((0.1, 0.1))
     with pytest.raises(EpisodeError, match=r"answered \[nan, 0.1\] at 0.05 s"):
         env.step((np.nan, 0.1))
-    with pytest.raises(EpisodeError, match=r"shape \(3,\)"):
+    with pytest.raises(EpisodeError, match=r"shape \(3,\) .*; a command is two .*, or a car's throttle and steering"):
         env.step((0.1, 0.1, 0.1))
     with pytest.raises(EpisodeError, match="answered with a str at 0.05 s"):
         env.step("ab")

@@ -21,7 +21,7 @@ from proxytune.diagnosis.camera.model import draw_pictures, neutral_state
 from proxytune.diagnosis.motion.diagnose import Diagnosis, declared_effects, diagnose
 from proxytune.diagnosis.motion.excitation import LIMITS, Limits
 from proxytune.diagnosis.motion.screening import motion_effects
-from proxytune.driving import Markings, Robot, ground_points
+from proxytune.driving import Markings, Robot, ground_points, is_robot
 from proxytune.effects import Catalogue, effect_of
 from proxytune.errors import LogError, SettingsError
 from proxytune.logs import Frames, Log, log_cautions, read_pictures
@@ -79,7 +79,7 @@ def diagnose_log(
         diagnose, log, robot, on_motion, test=test, seed=seed, report=report, rules=rules, limits=limits, folder=folder
     )
     camera = partial(diagnose_camera, log, robot, on_camera, seed=seed, report=report, folder=folder)
-    cautions = (*log_cautions(log, robot.figures), *_say_untried(robot.catalogue))
+    cautions = (*_say_other(log, robot), *log_cautions(log, robot.figures), *_say_untried(robot.catalogue))
     if log.frames is None:
         return LogDiagnosis(log.name, robot, motion(), None, cautions=cautions)
     if log.command == "none":
@@ -91,6 +91,12 @@ def diagnose_log(
     if moved is None and pictured is None:
         raise LogError(f"{no_motion}; camera: {no_camera}")
     return LogDiagnosis(log.name, robot, moved, pictured, no_motion, no_camera, cautions)
+
+
+def _say_other(log: Log, robot: Robot) -> Iterator[str]:
+    """Say so where the log names another robot that there is."""
+    if log.robot != robot.name and is_robot(log.robot, robot.catalogue.folder):
+        yield f"log.toml names the robot '{log.robot}', and '{robot.name}', which was given, counts"
 
 
 def _say_untried(catalogue: Catalogue) -> Iterator[str]:

@@ -288,3 +288,17 @@ def test_a_damaged_stage_of_a_camera_is_told_in_one_line_and_made_again(tmp_path
         diagnose_log(log, ROBOT, folder=tmp_path / "found", report=said.append)
     assert stages == OF_CAMERA[:1] * 2
     assert said == ["reading frames", "fitting the camera", f"{path}: is damaged; it is made again"]
+
+
+def test_a_robot_that_is_given_in_place_of_the_one_the_log_names_is_a_caution(monkeypatch):
+    monkeypatch.setattr("proxytune.diagnosis.log_diagnosis.diagnose", lambda *_, **__: None)
+    log = planted_log(TRUTH, episodes=1, seconds=5.0)
+    told = "log.toml names the robot 'duckiebot', and 'irobot_create', which was given, counts"
+    for named, given, cautions in (
+        ("duckiebot", "irobot_create", [told]),
+        ("duckiebot", "duckiebot", []),
+        ("nobodys", "duckiebot", []),
+    ):
+        own = replace(log, robot=named)
+        found = [line for line in diagnose_log(own, robot_of(own, given)).cautions if "names the robot" in line]
+        assert found == cautions

@@ -142,9 +142,12 @@ def _drive_row(one: Survey) -> tuple[str, ...]:
 
 def predict(arguments: argparse.Namespace) -> Answer:
     """`predict`: predict the poses of a log, or its pictures, by a model, and compare them with those measured."""
-    folder = arguments.output if arguments.frames else None
+    output, folder = arguments.output, arguments.output if arguments.frames else None
     log = (arguments.log, *(arguments.log / f"{name}.csv" for name in ("samples", "commands", "frames")))
-    check_place(arguments.output, folder=arguments.frames, inputs=(*log, *_files_of(arguments.model, Path.cwd())))
+    if output is not None:
+        check_place(output, folder=arguments.frames, inputs=(*log, *_files_of(arguments.model, Path.cwd())))
+    elif arguments.frames:
+        raise InputError("--frames: needs a folder for the pictures; give it by --output DIR")
     if arguments.frames and arguments.horizon is not None:
         raise InputError("--horizon: is for poses, and --frames predicts pictures instead; leave one of the two out")
     chosen: dict[str, Any] = {"wanted": wanted_of(arguments), "facts": facts_of(arguments)}
@@ -152,13 +155,15 @@ def predict(arguments: argparse.Namespace) -> Answer:
     with waiting("predicting") as tell:
         found = api.predict(arguments.model, arguments.log, frames=folder, tell=tell, **chosen)
     if isinstance(found, api.PicturePrediction):
-        return Answer(found.document(), Text(f"{found.sentence}\n{arguments.output}"))
-    report.write_text(arguments.output, found.poses.to_csv(index=False))
+        return Answer(found.document(), Text(f"{found.sentence}\n{output}"))
+    if output is not None:
+        report.write_text(output, found.poses.to_csv(index=False))
     count = found.error.windows or len(found.poses.groupby(["episode", "start_time"]))
     windows = f"{count} windows of {horizon:g} s"
-    document = {"predictions": str(arguments.output), **found.document()}
+    written = [] if output is None else [str(output)]
+    document = {"predictions": written[0] if written else None, **found.document()}
     cautions = [f"beware: {line}" for line in found.cautions]
-    lines = [*cautions, *found.notes, f"{windows}: {found.sentence}", str(arguments.output)]
+    lines = [*cautions, *found.notes, f"{windows}: {found.sentence}", *written]
     return Answer(document, Text("\n".join(lines)))
 
 

@@ -152,3 +152,15 @@ def test_an_interval_without_its_value_is_a_caution_and_a_camera_no_matter_of_po
     geometry = {"wheel_radius": 0.0318, "effective_baseline": 0.16, "full_speed": 0.6}
     path = model({"camera_pitch": 20.0}, robot="nobodys", geometry=geometry)
     assert answered("predict", path, folder, "--output", tmp_path / "poses.csv")["rows"]
+
+
+def test_without_a_place_for_the_poses_their_error_alone_is_told(folder, model, tmp_path, answered, refused, capsys):
+    path = model()
+    known, before = answered("predict", path, folder, "--output", tmp_path / "poses.csv"), set(tmp_path.iterdir())
+    assert answered("predict", path, folder) == {**known, "predictions": None}
+    assert main(["predict", str(path), str(folder)]) == 0
+    assert capsys.readouterr().out.startswith("10 windows of 2 s: RMSE 0.0 mm")
+    assert "--frames: needs a folder for the pictures; give it by --output DIR" in refused(
+        "predict", path, folder, "--frames"
+    )
+    assert set(tmp_path.iterdir()) == before

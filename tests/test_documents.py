@@ -19,7 +19,8 @@ from project import copy_studies
 import proxytune
 from proxytune.cli.main import BAD_INPUT, COMMANDS, DONE, FAILED, parser
 from proxytune.driving import AGENTS, METRICS, UNITS, map_names
-from proxytune.effects import CAR_CATALOGUE, CATALOGUE, GROUPS
+from proxytune.effects import CAR_CATALOGUE, CATALOGUE, GROUPS, Cue, WheelCurve
+from proxytune.effects.effect import MOTIONS, SIGNALS
 from proxytune.files import shipped
 from proxytune.learning.settings import KEYS as TEACHING_KEYS
 from proxytune.report.diagnosis.notes import VERDICTS
@@ -302,3 +303,13 @@ def test_the_commands_of_the_documents_run(line, tmp_path):
     done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, env=here)
     assert done.returncode == 0, done.stderr
     assert done.stdout
+
+
+def test_every_cue_curve_signal_and_motion_of_an_effect_s_trace_is_on_the_page():
+    cues, shown, signals, motions = (
+        row_of("how-to/extending.md", f"`{one}`") for one in ("cues", "shown", "Panel.signal", "Panel.motion")
+    )
+    assert set(Cue.__members__) == set(re.findall(r"([A-Z_]+)`", cues))
+    assert set(WheelCurve.__members__) == set(re.findall(r"([A-Z]+)`", shown))
+    assert set(SIGNALS) == set(re.findall(r'`"(.*?)"`', signals))
+    assert set(MOTIONS) == set(re.findall(r'`"(.*?)"`', motions))

@@ -73,9 +73,9 @@ class DomainFamily(Protocol):
         starts: How many starting conditions there are.
 
     It may have `nominal` too, from names in θ to values: the simulator as it is, which a study drives beside its
-    answer. Without it these are the neutral values of its parameters, unless the study's `proxy` holds others. And it
-    may have `truth(model)`: θ of a model.toml, as a study's key `truth` and `drive --theta` name one. Without it such a
-    file holds effects of proxytune alone.
+    answer; empty, none is driven. Without it these are the neutral values of its parameters, unless the study's
+    `proxy` holds others. And it may have `truth(model)`: θ of a model.toml, as a study's key `truth` and `drive
+    --theta` name one. Without it such a file holds effects of proxytune alone.
     """
 
     @property

@@ -263,5 +263,5 @@ def theta_of_model(family: DomainFamily, settings: StudySettings, model: Path, w
     except InputError as problem:
         if hasattr(family.parameters, "catalogue"):
             raise
-        remedy = f"{settings.family} has no method truth(model), so it can hold effects alone: add one that gives θ"
-        raise InputError(f"{where}: {problem}; {remedy}") from None
+        lacks = f"{settings.family} has no method truth(model), so {model.name} can hold effects alone"
+        raise InputError(f"{where}: {problem}; {lacks}; add one that gives θ") from None

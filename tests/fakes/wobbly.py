@@ -51,6 +51,7 @@ class Wobbly:
     faults: tuple[str, ...] = ()  # what goes wrong, as "agent:start:fault"; a start of * means every one
     journal: str = ""  # a file to which each simulated episode adds a line; empty for none
     version: str = "1"  # stands for the code's version
+    nominal = MappingProxyType({})  # none: what tests count is trials
 
     @property
     def identity(self) -> str:

@@ -295,7 +295,9 @@ def test_the_truth_of_a_family_of_one_s_own_is_what_its_method_reads_and_without
     told = complaint_of(open_study, folder)
     assert "study.toml: truth: " in told
     assert "truth.toml: trim: unknown key" in told
-    assert "wobbly:wobbly has no method truth(model), so it can hold effects alone: add one that gives θ" in told
+    assert (
+        "wobbly:wobbly has no method truth(model), so truth.toml can hold effects alone; add one that gives θ" in told
+    )
     told = complaint_of(drive, folder, "agent0", str(folder / "truth.toml"))
     assert told.startswith("theta ")
     assert "wobbly:wobbly has no method truth(model)" in told

@@ -389,11 +389,13 @@ def test_a_study_can_be_summed_up_from_its_first_trial_on(make_study):
 def test_the_nominal_theta_of_a_family_that_tells_none_is_neutral_where_it_follows_no_model(make_study):
     study = open_study(make_study())
     neutral = {"trim": 0.0, "delay": 0.0}
-    assert nominal_theta(study) == neutral
+    assert nominal_theta(study) is None, "it says that it has none"
     parameters = {**study.family.parameters, "trim": replace(study.family.parameters["trim"], neutral="wheel_radius")}
     for nominal, expected in ((None, neutral), ((("trim", 1.0),), neutral), ({"trim": 0.1}, None)):
         family = SimpleNamespace(parameters=study.family.parameters, nominal=nominal)
         assert nominal_theta(replace(study, family=family)) == expected
     assert nominal_theta(replace(study, family=SimpleNamespace(parameters=parameters))) is None
+    family = SimpleNamespace(parameters=study.family.parameters)
+    assert nominal_theta(replace(study, family=family)) == neutral
     held = replace(study.settings, proxy=study.settings.folder / "model.toml")
-    assert nominal_theta(replace(study, settings=held)) is None, "the model may hold others"
+    assert nominal_theta(replace(study, settings=held, family=family)) is None, "the model may hold others"

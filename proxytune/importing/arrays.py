@@ -26,11 +26,12 @@ from proxytune.importing.columns import (
     described,
     poses_by_drive,
     usual_names,
+    wheels_by_drive,
     with_commands,
 )
 from proxytune.importing.source import Channel, Drive, Pictures, Source, Wanted
 from proxytune.importing.text import COMMAND_FIELDS, POSE, Table
-from proxytune.logs import COMMANDS
+from proxytune.logs import COMMANDS, WHEELS
 from proxytune.settings import nearest
 
 Arrays = Mapping[str, NDArray[Any]]
@@ -134,7 +135,7 @@ def read_arrays(path: Path, wanted: Wanted) -> Source:
     _check_wanted(table, arrays, wanted)
     table, gym, notes = _gym_duckietown(table, arrays, wanted)
     none = wanted.without_commands
-    fields = ("time", "episode", *POSE, *(() if none else ("command_time", *COMMAND_FIELDS)))
+    fields = ("time", "episode", *POSE, *WHEELS, *(() if none else ("command_time", *COMMAND_FIELDS)))
     stated = {field: entry for field, entry in (gym | dict(wanted.columns)).items() if field in fields}
     columns: Columns = choose_columns(table, stated, fields)
     columns, kind = (columns, "none") if none else with_commands(columns, wanted.kind, table)
@@ -191,7 +192,10 @@ def _drives(table: Table, columns: Columns, kind: str, frames: NDArray[np.uint8]
     poses = poses_by_drive(table, columns)
     commands = commands_by_drive(table, columns, kind) if kind != "none" else {}
     labels = table.labels(columns["episode"].name) if "episode" in columns else np.full(len(table.cells), "")
-    drives = [Drive(label or table.path.stem, commands.get(label), poses[label]) for label in poses]
+    wheels = wheels_by_drive(table, columns)
+    drives = [
+        Drive(label or table.path.stem, commands.get(label), poses[label], wheels=wheels.get(label)) for label in poses
+    ]
     if frames is None:
         return drives
     times = column_values(table, columns["time"])

@@ -45,6 +45,11 @@ def check_units(drive: Drive, where: str) -> None:
     speed = _usual_speed(drive.poses)
     if speed > FASTEST_M_S:
         raise LogError(f"{about}: drives at {speed:.3g} m/s; state the units of x, y and time (--columns x=pos_x:mm)")
+    if drive.wheels is not None:
+        fastest = float(np.percentile(np.abs(drive.wheels.speeds), 95))
+        if fastest > FASTEST_WHEEL_RAD_S:
+            remedy = "state their unit (--columns wheel_left=left_ticks:ticks/4096)"
+            raise LogError(f"{about}: its wheels turn at {fastest:.3g} rad/s; {remedy}")
     if drive.commands is not None:
         _check_commands(drive.commands, drive.poses, about)
 

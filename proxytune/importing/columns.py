@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 from proxytune.arrays import Floats
 from proxytune.errors import LogError
 from proxytune.importing.checks import FURTHEST_BACK_S, headings_and_tilts
-from proxytune.importing.source import Channel, Commands, Poses, Wanted
+from proxytune.importing.source import Channel, Commands, Poses, Wanted, Wheels
 from proxytune.importing.text import COMMAND_FIELDS, EXAMPLE, PLACE, POSE, QUANTITIES, QUATERNION, USUAL, Table
-from proxytune.logs import COMMANDS, ENABLED
+from proxytune.logs import COMMANDS, ENABLED, WHEELS
 from proxytune.settings import nearest
 
 
@@ -30,6 +30,7 @@ class Unit:
     name: str
     quantity: str
     factor: float
+    counted: bool = False  # whether it is of the angle that a wheel has turned, whose speed is wanted
 
 
 UNITS = {
@@ -67,6 +68,20 @@ SHORTEST_STEP_S, LONGEST_STEP_S = 1e-5, 10.0
 """Median step of stamps outside of which a unit that nobody stated is doubted."""
 
 
+TICKS = re.compile(r"ticks/(\d+(?:\.\d+)?)")
+"""A wheel's counter, and how far it counts in a turn."""
+COUNTERS = (2.0**16, 2.0**32)
+"""Counters begin anew after so many ticks: the first that is more than all that a column spans."""
+
+
+def unit_named(name: str) -> Unit | None:
+    """A unit of UNITS, or that of a counter such as ticks/4096; None where there is no such unit."""
+    ticks = TICKS.fullmatch(name)
+    if ticks and float(ticks[1]) > 0.0:
+        return Unit(name, "turning speed", 2.0 * np.pi / float(ticks[1]), counted=True)
+    return UNITS.get(name)
+
+
 def own_unit(quantity: str) -> Unit:
     """The package's unit of a quantity."""
     return next(unit for unit in UNITS.values() if unit.quantity == quantity)
@@ -93,16 +108,17 @@ def split_unit(entry: str, quantity: str, names: Sequence[str], where: str) -> t
     One of the file's names may hold a colon itself.
     """
     name, colon, unit = entry.rpartition(":")
-    if entry in names or not colon or (name not in names and unit not in UNITS):
+    if entry in names or not colon or (name not in names and unit_named(unit) is None):
         return entry, None
     known = [known.name for known in UNITS.values() if known.quantity == quantity and quantity != "number"]
     if not known:
         raise LogError(f"{where}: has no unit; leave out ':{unit}'")
-    if unit not in UNITS:
+    known += ["ticks/4096 (of a measured wheel)"] if quantity == "turning speed" else []
+    if (found := unit_named(unit)) is None:
         raise LogError(f"{where}: unknown unit '{unit}'; known are: {', '.join(known)}")
-    if unit not in known:
+    if found.quantity != quantity:
         raise LogError(f"{where}: '{unit}' is no unit of {quantity}; known are: {', '.join(known)}")
-    return name, UNITS[unit]
+    return name, found
 
 
 def epoch_unit(values: Floats) -> Unit | None:
@@ -233,12 +249,19 @@ def column_values(table: Table, column: Column) -> Floats:
     """The values of a column in the package's unit (N,), NaN where a cell is empty."""
     values = table.numbers(column.name)
     problem = contradiction(column.unit, values) if column.known_by in ("assumed", "by its name") else ""
+    if column.field in WHEELS and column.known_by == "assumed" and not problem:
+        seen = values[np.isfinite(values)]
+        problem = "whole numbers are more like counts" if seen.any() and not (seen % 1.0).any() else ""
     if problem:
         others = [unit for unit in UNITS.values() if unit.quantity == column.unit.quantity and unit != column.unit]
         likely = next((unit for unit in others if not contradiction(unit, values)), column.unit)
         remedy = f"state its unit, as in --columns {column.field}={column.name}:{likely.name}"
         if "pulses" in problem:
             remedy = "write such a column into the file"
+        elif column.field in WHEELS:
+            remedy = (
+                f"state its unit, as in --columns {column.field}={column.name}:ticks/4096 (so many a turn), or rad/s"
+            )
         elif column.field == "throttle":
             remedy = f"if it is in percent, --columns throttle={column.name}:percent"
         elif column.field == "steering":
@@ -252,8 +275,11 @@ def missing(table: Table, fields: Sequence[str]) -> LogError:
     """The complaint about fields that no column was found for."""
     car = {"throttle", "steering", "speed", "steering_angle"} & set(fields)
     example = EXAMPLE.replace("v=cmd_lin,omega=cmd_ang", "throttle=gas,steering=wheel") if car else EXAMPLE
+    if len(fields) == 1 and (field := fields[0].split()[0]) in QUANTITIES:
+        example = f"--columns {field}=COLUMN"
     lacking = f"no column found for {', '.join(fields)}; its columns are: {', '.join(table.names)}"
-    return LogError(f"{table.path}: {lacking}; say which is which, as in {example}")
+    which = "it is" if len(fields) == 1 else "is which"
+    return LogError(f"{table.path}: {lacking}; say which {which}, as in {example}")
 
 
 def with_commands(columns: Columns, kind: str, table: Table) -> tuple[Columns, str]:
@@ -293,6 +319,8 @@ def _stated(table: Table, field: str, entry: str) -> Column:
     name, unit = split_unit(entry, QUANTITIES[field], table.names, where)
     if name not in table.names:
         raise LogError(f"{where}: has no column '{name}'; {nearest(name, table.names)}")
+    if unit and unit.counted and field not in WHEELS:
+        raise LogError(f"{where}: ticks are of a measured wheel, {' or '.join(WHEELS)}; state another unit")
     return Column(field, name, unit, "stated") if unit else _by_ending(field, name)
 
 
@@ -373,6 +401,34 @@ def poses_by_drive(table: Table, columns: Columns, *, gaps: bool = False) -> dic
         drives[name] = poses.only(mine)
         _check_clock(drives[name].times, f"{_where(table, name)}: poses")
     return drives
+
+
+def wheels_by_drive(table: Table, columns: Columns) -> dict[str, Wheels]:
+    """The measured wheel speeds of each drive that a table names, where it has them; counts are differentiated."""
+    if not set(WHEELS) & set(columns):
+        return {}
+    if lacking := [field for field in WHEELS if field not in columns]:
+        raise missing(table, lacking)
+    times, values, labels = _filled_rows(table, columns, WHEELS)
+    drives = {}
+    for name in dict.fromkeys(map(str, labels)):
+        own, first = np.unique(times[labels == name], return_index=True)
+        if len(own) < 2:
+            raise LogError(f"{_where(table, name)}: has a single row of wheel speeds; a drive needs two or more")
+        speeds = [
+            _rate(turned, own, columns[field].unit)
+            for field, turned in zip(WHEELS, values[labels == name][first].T, strict=True)
+        ]
+        drives[name] = Wheels(own, np.stack(speeds, axis=1))
+    return drives
+
+
+def _rate(values: Floats, times: Floats, unit: Unit) -> Floats:
+    """Speeds (W,), of counted angles [rad] too, whose counter may begin anew."""
+    if not unit.counted:
+        return values
+    around = next((ticks for ticks in COUNTERS if np.ptp(values) < ticks * unit.factor), COUNTERS[-1])
+    return np.asarray(np.gradient(np.unwrap(values, period=around * unit.factor), times))
 
 
 def gaps_note(table: Table, columns: Columns) -> list[str]:

@@ -23,7 +23,7 @@ from proxytune.importing.checks import check_units, checked_drive, lag_of
 from proxytune.importing.source import Drive, Facts, Pictures, Source, Survey, Wanted
 from proxytune.importing.tables import is_csv_tables, is_mrclam, is_tum, read_csv_tables, read_mrclam, read_tum
 from proxytune.importing.topics import read_bag
-from proxytune.logs import CAR_COMMANDS, COMMANDS, ENABLED, Log, read_log
+from proxytune.logs import CAR_COMMANDS, COMMANDS, ENABLED, WHEELS, Log, read_log
 
 GAP_S = 0.5
 """A longer time without a pose is a gap."""
@@ -155,7 +155,9 @@ def fill_log(folder: Path, source: Source, facts: Facts, name: str, origin: str)
     samples, commands = [], []
     for drive in source.drives:
         poses = (drive.poses.times, drive.poses.places[:, :2], np.unwrap(drive.poses.headings))
-        samples.append(_named(drive.name, poses, ("time", "x", "y", "heading")))
+        wheels = () if drive.wheels is None else drive.wheels.at(drive.poses.times)
+        names = ("time", "x", "y", "heading", *WHEELS)[: 4 + len(wheels)]
+        samples.append(_named(drive.name, (*poses, *wheels), names))
         if drive.commands is not None:
             names = ("time", *COMMANDS[drive.commands.kind], ENABLED)[: 1 + drive.commands.values.shape[1]]
             commands.append(_named(drive.name, (drive.commands.times, drive.commands.values), names))

@@ -1,6 +1,6 @@
 """The contract of importers: what a user asks for (Wanted), what every importer returns (Source), and further Facts.
 
-A source has drives with commands, poses and pictures, each at times of their own.
+A source has drives with commands, poses, wheel speeds and pictures, each at times of their own.
 """
 
 import math
@@ -48,6 +48,19 @@ class Poses:
 
 
 @dataclass(frozen=True)
+class Wheels:
+    """Speeds of the left and the right wheel (W, 2) [rad/s] as they were measured at times (W,) [s], in order."""
+
+    times: Floats
+    speeds: Floats
+
+    def at(self, times: Floats) -> tuple[Floats, Floats]:
+        """The speeds of the left and the right wheel at other times (N,), NaN before the first and after the last."""
+        left, right = (np.interp(times, self.times, own, np.nan, np.nan) for own in self.speeds.T)
+        return left, right
+
+
+@dataclass(frozen=True)
 class Pictures:
     """Pictures of the robot's camera, taken at K times [s]; `read` makes them, (rows, columns, 3), one by one."""
 
@@ -57,12 +70,13 @@ class Pictures:
 
 @dataclass(frozen=True)
 class Drive:
-    """One drive of a source, as the log calls it: its commands, poses and pictures, None where there are none."""
+    """One drive of a source, as the log calls it: what was recorded, None where it was not."""
 
     name: str
     commands: Commands | None
     poses: Poses
     pictures: Pictures | None = None
+    wheels: Wheels | None = None
 
 
 @dataclass(frozen=True)

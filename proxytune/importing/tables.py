@@ -30,12 +30,13 @@ from proxytune.importing.columns import (
     pose_fields,
     poses_by_drive,
     summed,
+    wheels_by_drive,
     with_commands,
     with_drives,
 )
 from proxytune.importing.source import Channel, Commands, Drive, Source, Wanted
 from proxytune.importing.text import COMMAND_FIELDS, EXAMPLE, POSE, Table, first_rows, is_number, read_text_table
-from proxytune.logs import COMMANDS, ENABLED
+from proxytune.logs import COMMANDS, ENABLED, WHEELS
 from proxytune.settings import nearest
 
 STEMS = ("commands", "cmd_vel", "cmd")
@@ -190,7 +191,11 @@ def _read_recording(file: Path, wanted: Wanted, *, alone: bool) -> tuple[Source,
         if label not in poses:
             raise LogError(f"{file}: drive '{label}' has commands but no poses; leave its rows out")
     names = [label if label and alone else "_".join(filter(None, (file.stem, label))) for label in poses]
-    drives = tuple(Drive(name, commands.get(label), poses[label]) for name, label in zip(names, poses, strict=True))
+    wheels = wheels_by_drive(table, columns)
+    drives = tuple(
+        Drive(name, commands.get(label), poses[label], wheels=wheels.get(label))
+        for name, label in zip(names, poses, strict=True)
+    )
     notes = (f"Columns: {described(columns)}.", *gaps_note(table, columns))
     return Source("", drives, tuple(channels_of(table, columns)), notes), tuple(poses), None if commands else apart
 
@@ -198,7 +203,7 @@ def _read_recording(file: Path, wanted: Wanted, *, alone: bool) -> tuple[Source,
 def _columns(table: Table, wanted: Wanted, apart: Path | None) -> tuple[Columns, str]:
     """The columns of a table of poses that are used, and the kind of its commands; "none" where it has none."""
     own = not (wanted.commands or wanted.without_commands)
-    fields = ("time", "episode", *POSE, *(("command_time", *COMMAND_FIELDS) if own else ()))
+    fields = ("time", "episode", *POSE, *WHEELS, *(("command_time", *COMMAND_FIELDS) if own else ()))
     stated = {
         field: entry
         for field, entry in wanted.columns.items()
@@ -285,6 +290,10 @@ def is_tum(path: Path) -> bool:
 def read_tum(path: Path, wanted: Wanted) -> Source:
     """Read TUM trajectories, a drive each, and the commands of each from a second file (`find_commands`)."""
     check_fields(path, wanted)
+    if stated := [field for field in WHEELS if field in wanted.columns]:
+        raise LogError(
+            f"{path}: {stated[0]}: a TUM file holds no wheel speeds; write poses and wheels into a CSV table"
+        )
     parts = [_read_one(file, wanted) for file in (sorted(path.glob("*.tum")) if path.is_dir() else [path])]
     return _together(f"{len(parts)} TUM trajectories" if len(parts) > 1 else "TUM trajectory", parts)
 

@@ -4,6 +4,7 @@ from .log import (
     CAR_COMMANDS as CAR_COMMANDS,
     COMMANDS as COMMANDS,
     ENABLED as ENABLED,
+    WHEELS as WHEELS,
     Frames as Frames,
     Log as Log,
     LogEpisode as LogEpisode,

@@ -367,7 +367,7 @@ def test_a_cars_commands_are_throttle_and_steering_or_speed_and_wheel_angle(file
     np.testing.assert_allclose(drive.commands.values[0], [0.3, np.radians(20.0)])
     said = complaint(file(CAR), columns={"throttle": "gas"})
     assert "no column found for steering" in said
-    assert said.endswith("throttle=gas,steering=wheel")
+    assert said.endswith("--columns steering=COLUMN")
 
 
 @pytest.mark.parametrize(
@@ -380,3 +380,66 @@ def test_a_cars_commands_are_throttle_and_steering_or_speed_and_wheel_angle(file
 )
 def test_throttle_in_percent_and_steering_in_degrees_or_pulses_are_refused(file, before, after, said):
     assert said in complaint(file(CAR.replace(before, after)), columns=CAR_MAP)
+
+
+RATES = np.array([3.0, -5.0])
+COUNTED = {"wheel_left": "l:ticks/64", "wheel_right": "r:ticks/64"}
+
+
+def counted(first=(0.0, 0.0), around=2.0**60):
+    """A table whose wheels turn at RATES and count 64 a turn, from a first count on, in a counter of so many."""
+    rows = ["time,x,y,heading,v,omega,l,r"]
+    for time in np.arange(0.0, 2.0, 0.1):
+        left, right = np.mod(np.round(first + RATES * time * 64.0 / (2.0 * np.pi)), around)
+        rows.append(f"{time:.1f},0,0,0,0.5,0,{left:.0f},{right:.0f}")
+    return "\n".join(rows) + "\n"
+
+
+@pytest.mark.parametrize(
+    ("first", "around"),
+    [((0, 1000), 2.0**60), ((65530, 3), 2.0**16), ((2.0**32 - 5, 40), 2.0**32), ((7e6, 9e6), 2.0**60)],
+)
+def test_counts_of_wheels_are_speeds_and_a_counter_that_begins_anew_goes_on(file, first, around):
+    source = read(file(counted(first, around)), columns=COUNTED)
+    (drive,) = source.drives
+    np.testing.assert_allclose(drive.wheels.speeds[1:-1].mean(axis=0), RATES, rtol=0.02)
+    np.testing.assert_allclose(drive.wheels.speeds, np.tile(RATES, (20, 1)), atol=2.0 * np.pi / 64.0 / 0.1 * 0.51)
+    assert "wheel_left from 'l' (ticks/64, stated)" in source.notes[0]
+
+
+def test_measured_wheel_speeds_have_units_and_may_be_known_in_other_rows_than_poses(file):
+    text = "time,x,y,heading,v,omega,l,r\n0,0,0,0,1,0,,\n0.5,,,,,,30,60\n1,1,0,0,1,0,,\n1.5,,,,,,60,60\n2,2,0,0,1,0,,\n"
+    (drive,) = read(file(text), columns={"wheel_left": "l:rpm", "wheel_right": "r:rpm"}).drives
+    np.testing.assert_allclose(drive.wheels.speeds, [[np.pi, 2.0 * np.pi], [2.0 * np.pi, 2.0 * np.pi]])
+    left, right = drive.wheels.at(drive.poses.times)
+    np.testing.assert_allclose((left, right), [[np.nan, 1.5 * np.pi, np.nan], [np.nan, 2.0 * np.pi, np.nan]])
+    assert read(file(text)).drives[0].wheels is None
+
+
+@pytest.mark.parametrize(
+    ("columns", "said"),
+    [
+        ({"wheel_left": "l:ticks/64"}, "no column found for wheel_right; its columns are"),
+        (
+            {"wheel_left": "l", "wheel_right": "r"},
+            "whole numbers are more like counts; state its unit, as in --columns",
+        ),
+        (
+            {"wheel_left": "l:ticks/0", "wheel_right": "r"},
+            "unknown unit 'ticks/0'; known are: rad/s, deg/s, rpm, ticks",
+        ),
+        ({"omega": "r:ticks/64"}, "ticks are of a measured wheel, wheel_left or wheel_right"),
+        ({"x": "l:ticks/64"}, "'ticks/64' is no unit of length"),
+    ],
+)
+def test_wheels_without_a_partner_or_a_unit_and_ticks_of_something_else_are_refused(file, columns, said):
+    assert said in complaint(file(counted()), columns=columns)
+
+
+def test_a_trajectory_has_no_wheels(tmp_path):
+    assert "holds no wheel speeds; write poses" in complaint(write_tum(tmp_path), read_tum, columns=COUNTED)
+
+
+def test_one_missing_column_is_asked_for_alone(file):
+    text = BOTH.replace("v,omega", "cmd_vel_x,cmd_vel_turning")
+    assert complaint(file(text)).endswith("say which it is, as in --columns omega=COLUMN")

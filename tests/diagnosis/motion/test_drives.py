@@ -3,15 +3,17 @@
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 from one_line import complaint_of
-from planted import ROBOT, driven_log, planted_log
+from planted import ROBOT, TRUTH, driven_log, planted_log
 
 from proxytune.diagnosis import robot_of
 from proxytune.diagnosis.motion import drives as gathering
 from proxytune.diagnosis.motion.drives import Recent, cosine_and_sine, duties_of, gather, number_of, relative, sum_by
 from proxytune.driving import read_robot
 from proxytune.errors import LogError
+from proxytune.importing import Facts, Wanted, open_log
 from proxytune.logs import Log, LogEpisode
 
 
@@ -145,6 +147,28 @@ def test_wheel_speeds_are_used_where_all_episodes_have_them_without_a_gap():
 
     np.testing.assert_allclose(gathered(episode(0.01 * np.arange(40))).rest[0], 0.2 / ROBOT.figures["full_speed"])
     np.testing.assert_array_equal(gathered(episode(0.004 * np.arange(40) ** 2 / 40)).rest[0], 0.0)
+
+
+def test_counts_of_encoders_in_a_table_tell_how_far_wheels_have_turned_and_whether_they_did_at_the_start(tmp_path):
+    spinning = np.array([3.0, 4.0])  # faster than it drives: its wheels slip
+    rows = [
+        pd.DataFrame({"run": e.name, "time": e.times, "left": e.commands[:, 0], "right": e.commands[:, 1]})
+        .assign(x=e.poses[:, 0], y=e.poses[:, 1], heading=e.poses[:, 2])
+        .assign(
+            **{
+                f"{side}_ticks": np.round(e.times * speed * 4096.0 / (2.0 * np.pi))
+                for side, speed in zip("lr", spinning, strict=True)
+            }
+        )
+        for e in planted_log(TRUTH, episodes=2).episodes
+    ]
+    pd.concat(rows).to_csv(tmp_path / "drives.csv", index=False)
+    columns = {"wheel_left": "l_ticks:ticks/4096", "wheel_right": "r_ticks:ticks/4096"}
+    with open_log(tmp_path / "drives.csv", Wanted(columns=columns), Facts(robot="duckiebot")) as (imported, _):
+        drives = gather(imported, ROBOT, imported.episodes)
+    np.testing.assert_allclose(drives.rest, np.tile(spinning * SPEED_PER_RAD, (2, 1)), rtol=0.02)
+    seconds = np.arange(drives.angles.shape[1]) / drives.tick_hz
+    np.testing.assert_allclose(drives.angles, np.tile(seconds[:, None] * spinning, (2, 1, 1)), atol=0.05)
 
 
 def at_own_times(issued, commands, rows=4, wheels=None):

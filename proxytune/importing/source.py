@@ -4,7 +4,7 @@ A source has drives with commands, poses, wheel speeds and pictures, each at tim
 """
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -151,6 +151,14 @@ class Facts:
     def offset_s(self) -> float:
         """Seconds that poses are known to be stamped later than commands."""
         return 0.0 if self.clock_offset in ("", "fit") else float(self.clock_offset)
+
+
+def told_once(said: Sequence[tuple[str, str]], count: int, what: str) -> list[tuple[str, str]]:
+    """Names and what is said of them: every note once, with the names that it is of, or "all 8 drives"."""
+    names: dict[str, list[str]] = {}
+    for name, note in said:
+        names.setdefault(note, []).append(name)
+    return [(f"all {count} {what}" if len(own) == count > 1 else ", ".join(own), note) for note, own in names.items()]
 
 
 def finite(text: str) -> float | None:

@@ -34,7 +34,7 @@ from proxytune.importing.columns import (
     with_commands,
     with_drives,
 )
-from proxytune.importing.source import Channel, Commands, Drive, Source, Wanted
+from proxytune.importing.source import Channel, Commands, Drive, Source, Wanted, told_once
 from proxytune.importing.text import COMMAND_FIELDS, EXAMPLE, POSE, Table, first_rows, is_number, read_text_table
 from proxytune.logs import COMMANDS, ENABLED, WHEELS
 from proxytune.settings import nearest
@@ -64,7 +64,7 @@ def find_commands(path: Path, wanted: Wanted) -> Path | None:
 
 
 def read_commands(path: Path, wanted: Wanted) -> tuple[CommandsOf, tuple[Channel, ...], str]:
-    """Read a file of commands, a table with stamps and the columns of one kind; and say what was taken for what."""
+    """Read a file of commands, a table with stamps and the columns of one kind; and say what was taken for them."""
     table = read_text_table(path)
     stated = {ours: entry for ours, entry in wanted.columns.items() if ours in COMMAND_FIELDS or named_in(table, entry)}
     found = choose_columns(table, stated, ("time", "episode", *COMMAND_FIELDS))
@@ -72,7 +72,13 @@ def read_commands(path: Path, wanted: Wanted) -> tuple[CommandsOf, tuple[Channel
     used = {field: columns[field] for field in ("time", "episode", *COMMANDS[kind], ENABLED) if field in columns}
     commands = commands_by_drive(table, used, kind)
     channels = tuple(replace(c, name=f"{path.name}: {c.name}") for c in channels_of(table, used))
-    return commands, channels, f"Commands of {path.name}: {described(used)}."
+    return commands, channels, described(used)
+
+
+def _commands_notes(said: Sequence[tuple[str, str]]) -> list[str]:
+    """Tell what was taken for commands in files of these names, those alike together."""
+    files = list(dict.fromkeys(said))
+    return [f"Commands of {who}: {columns}." for who, columns in told_once(files, len(files), "files")]
 
 
 def share_commands(path: Path, known: CommandsOf, drives: Sequence[Drive], labels: Sequence[str]) -> list[Drive]:
@@ -143,17 +149,19 @@ def read_csv_tables(path: Path, wanted: Wanted) -> Source:
     files = _files(path, wanted)
     recordings = [_read_recording(file, wanted, alone=len(files) == 1) for file in files]
     whole = _together("folder of CSV files" if path.is_dir() else "CSV table", [source for source, *_ in recordings])
-    drives, channels, notes = [], [*whole.channels], [*whole.notes]
+    drives, channels = [], [*whole.channels]
+    said: list[tuple[str, str]] = []
     for apart in dict.fromkeys(place for *_, place in recordings):
         mine = [(source.drives, labels) for source, labels, place in recordings if place == apart]
         group = [drive for own, _ in mine for drive in own]
         if apart:
-            commands, own_channels, note = read_commands(apart, wanted)
+            commands, own_channels, columns = read_commands(apart, wanted)
             group = share_commands(apart, commands, group, [label for _, labels in mine for label in labels])
             channels += own_channels
-            notes.append(note)
+            said.append((apart.name, columns))
         drives += group
-    return replace(whole, drives=tuple(drives), channels=tuple(channels), notes=tuple(dict.fromkeys(notes)))
+    notes = (*whole.notes, *_commands_notes(said))
+    return replace(whole, drives=tuple(drives), channels=tuple(channels), notes=notes)
 
 
 def _together(form: str, parts: Sequence[Source]) -> Source:
@@ -294,11 +302,14 @@ def read_tum(path: Path, wanted: Wanted) -> Source:
         raise LogError(
             f"{path}: {stated[0]}: a TUM file holds no wheel speeds; write poses and wheels into a CSV table"
         )
-    parts = [_read_one(file, wanted) for file in (sorted(path.glob("*.tum")) if path.is_dir() else [path])]
-    return _together(f"{len(parts)} TUM trajectories" if len(parts) > 1 else "TUM trajectory", parts)
+    said: list[tuple[str, str]] = []
+    parts = [_read_one(file, wanted, said) for file in (sorted(path.glob("*.tum")) if path.is_dir() else [path])]
+    whole = _together(f"{len(parts)} TUM trajectories" if len(parts) > 1 else "TUM trajectory", parts)
+    return replace(whole, notes=(*whole.notes, *_commands_notes(said)))
 
 
-def _read_one(path: Path, wanted: Wanted) -> Source:
+def _read_one(path: Path, wanted: Wanted, said: list[tuple[str, str]]) -> Source:
+    """One trajectory as a drive; what was taken for its commands joins what is said of files."""
     table = read_text_table(path, COLUMNS)
     columns = own_columns(COLUMNS)
     drive = Drive(path.stem, None, poses_by_drive(table, columns)[""])
@@ -309,10 +320,7 @@ def _read_one(path: Path, wanted: Wanted) -> Source:
         lay = f"lay {path.stem}_commands.csv (time, v, omega) beside it, name another file with --commands FILE"
         none = "or write --commands none for a log without them"
         raise LogError(f"{path}: a TUM file holds no commands; {lay}, {none}")
-    commands, channels, note = read_commands(file, wanted)
-    return replace(
-        source,
-        drives=tuple(share_commands(file, commands, [drive], [""])),
-        channels=(*source.channels, *channels),
-        notes=(*source.notes, note),
-    )
+    commands, channels, taken = read_commands(file, wanted)
+    said.append((file.name, taken))
+    shared = tuple(share_commands(file, commands, [drive], [""]))
+    return replace(source, drives=shared, channels=(*source.channels, *channels))

@@ -11,7 +11,7 @@ from proxytune.errors import LogError
 from proxytune.files import package_table
 from proxytune.importing.bag import COMMAND_TYPES, Topic, bags_in, form_of, open_bag, read_commands, read_poses
 from proxytune.importing.bag_scene import TRANSFORMS, choose_transform, read_chain, read_pictures, read_transforms
-from proxytune.importing.source import Channel, Drive, Source, Wanted
+from proxytune.importing.source import Channel, Drive, Source, Wanted, told_once
 from proxytune.importing.vesc import KIND as VESC, pair_topics, read_vesc, servo_of
 from proxytune.logs import COMMANDS
 from proxytune.settings import nearest
@@ -184,12 +184,14 @@ def read_bag(path: Path, wanted: Wanted) -> Source:
         with open_bag(first) as opened:
             transforms = read_transforms(opened)
         choice = replace(choice, transform=choose_transform(transforms, f"{first}: {choice.poses.name}"))
-    drives = []
+    drives: list[Drive] = []
+    said: list[tuple[str, str]] = []
     notes = [*notes_of(topics, choice), *notes]
     for name, bag in bags.items():
-        drive, said = _read_drive(name, bag, choice, wanted)
+        drive, own = _read_drive(name, bag, choice, wanted)
         drives.append(drive)
-        notes += said if len(bags) == 1 else [f"{name}: {note}" for note in said]
+        said += [(name, note) for note in dict.fromkeys(own)]
+    notes += [note if len(bags) == 1 else f"{who}: {note}" for who, note in told_once(said, len(bags), "drives")]
     forms = sorted({form_of(bag) for bag in bags.values()})
     form = forms[0] if len(bags) == 1 else f"{len(bags)} bags: {', '.join(forms)}"
     return Source(form, tuple(drives), channels_of(topics, choice), tuple(dict.fromkeys(notes)))

@@ -146,6 +146,21 @@ def test_each_file_of_a_folder_is_a_drive(tmp_path, file):
     assert len(source.notes) == 1
 
 
+def test_what_is_alike_in_every_file_of_commands_is_told_once(tmp_path, file):
+    for name, commands in (("a", COMMANDS), ("b", COMMANDS), ("c", COMMANDS)):
+        file(POSES, f"{name}.csv"), file(commands, f"{name}_commands.csv")
+    assert [note.split(":")[0] for note in read(tmp_path).notes] == ["Columns", "Commands of all 3 files"]
+    file(COMMANDS.replace("v,omega", "left,right"), "c_commands.csv")
+    notes = [note.split(":")[0] for note in read(tmp_path).notes]
+    assert notes == ["Columns", "Commands of a_commands.csv, b_commands.csv", "Commands of c_commands.csv"]
+    for name in "ab":
+        file(LINES, f"{name}.tum")
+    assert "Commands of all 2 files" in read_tum(tmp_path, Wanted()).notes[-1]
+    for path in tmp_path.glob("*_commands.csv"):
+        path.rename(tmp_path / "commands.csv")
+    assert "Commands of commands.csv" in read_tum(tmp_path, Wanted()).notes[-1]
+
+
 @pytest.mark.parametrize("name", ["commands.csv", "cmd_vel.csv", "run1_cmd_vel.csv", "run1_commands.txt"])
 def test_commands_beside_the_poses_are_joined(file, name):
     file(COMMANDS, name)

@@ -260,6 +260,8 @@ def test_bags_of_a_folder_share_their_topics(tmp_path):
     bags.write_bag(tmp_path / "two.bag", "ros1", *BOTH)
     for drive in read_bag(tmp_path, Wanted()).drives:
         assert np.array_equal(drive.poses.places[:, 0], POSES[:, 0])
+    header = "/cmd_vel has no header: its times are when the bag received each message."
+    assert [note for note in read_bag(tmp_path, Wanted()).notes if "header" in note] == [f"all 2 drives: {header}"]
 
 
 def test_transforms_of_the_first_bag_are_those_of_all(tmp_path):

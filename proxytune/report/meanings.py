@@ -50,8 +50,18 @@ def finding(effect: Mapping[str, Any], catalogue: Catalogue = SHIPPED) -> str:
     sized = {key: one for key, one in known.items() if one["value"] is not None}
     # What a form of the effect holds at 0 says nothing.
     sizes = {key: _size(one) for key, one in sized.items() if one["value"] != 0.0 or len(set(one["interval"])) > 1}
-    said = [clause_of(own.get(key, key), size) or f"{plain(key)} {size}" for key, size in sizes.items()]
+    said = [_clause(own.get(key, key), sized[key]) or f"{plain(key)} {size}" for key, size in sizes.items()]
     return f"{plain(name)}: {'; '.join([listed(said), *_worth(effect)])}" if said else plain(name)
+
+
+def _clause(name: str, estimate: Mapping[str, Any]) -> str:
+    """What a value says, by its name in θ; a factor below 1 is told as 1 − 0.01, not as 1 + −0.01."""
+    adds = "1 + {}"
+    if adds not in CLAUSES.get(name, "") or estimate["value"] >= 0.0:
+        return clause_of(name, _size(estimate))
+    ends = [None if end is None else -end for end in reversed(estimate["interval"])]
+    less = {**estimate, "value": -estimate["value"], "interval": ends}
+    return CLAUSES[name].replace(adds, "1 − {}").format(_size(less))
 
 
 def findings(effects: Iterable[Mapping[str, Any]], catalogue: Catalogue = SHIPPED) -> str:

@@ -122,8 +122,9 @@ def why_unknown(needs: learning.SampleNeeds) -> PlvUnknown | None:
     """The reason why nothing is known of PLV, or no more than a bound; None where it is known."""
     last, tolerance = f"{needs.last:g}", f"{needs.when.tolerance:g}"
     if needs.gain is None:
-        reason = f"teaching.target_samples has no number from 1 to half of {last} that would show a rise towards it"
-        return PlvUnknown(reason, f"add numbers between 0 and {last} to teaching.target_samples")
+        half, counts = f"{needs.last / 2.0:.0f}", sorted({*needs.curves[learning.NONE].counts, round(needs.last / 3.0)})
+        reason = f"teaching.target_samples has no number from 1 to {half}, which would show a rise towards {last}"
+        return PlvUnknown(reason, f"add a number of target samples between 1 and {half}, as {counts}")
     if not needs.settled:
         rises = f"the score still rises by more than {tolerance} over the last doubling to {last} samples"
         return PlvUnknown(f"without a proxy {rises}", RAISE)

@@ -50,6 +50,10 @@ def test_what_was_found_or_declared_is_told_with_name_meaning_size_and_worth_and
         "turn slip: turning costs forward speed, a share of 0.31 s/rad (0.27 to 0.35) for each rad/s; "
         "without it predictions over 2 s are 13 % worse (8 to 19)"
     )
+    resists = {"square": {"value": -0.01, "interval": [-0.02, 0.01], "unit": "s²/m²"}}
+    assert finding({"name": "inertia", "parameters": resists}).endswith(
+        "by the factor 1 − 0.01 s²/m² (−0.01 to 0.02) times the square of the speed"
+    )
     assert findings([BAND, SLIP]) == f"{finding(BAND)}; {finding(SLIP)}"
 
     assert "without it" not in finding({**SLIP, "worth": {"2": {"value": 0.0, "interval": [-2.0, 2.0], "unit": "%"}}})

@@ -96,8 +96,8 @@ def test_the_next_step_is_more_seeds_while_something_is_open_and_says_why_plv_is
     assert "is unknown: without a proxy the score still rises by more than 5" in teach_answer(rising)
     assert teach_next_step(rising).startswith("raise teaching.target_samples: ")
     coarse = experiment(gain=None)
-    assert "is unknown: teaching.target_samples has no number from 1 to half of 400" in teach_answer(coarse)
-    assert "add numbers between 0 and 400" in teach_next_step(coarse)
+    assert "is unknown: teaching.target_samples has no number from 1 to 200, which would" in teach_answer(coarse)
+    assert teach_next_step(coarse).startswith("add a number of target samples between 1 and 200, as [0, 50, ")
     assert "raise teaching.examinations from 20 to 40" in teach_next_step(experiment(examinations=20))
 
 

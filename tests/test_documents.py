@@ -21,9 +21,10 @@ from proxytune.cli.main import BAD_INPUT, COMMANDS, DONE, FAILED, parser
 from proxytune.driving import AGENTS, METRICS, UNITS, map_names
 from proxytune.effects import CAR_CATALOGUE, CATALOGUE, GROUPS, Cue, WheelCurve
 from proxytune.effects.effect import MOTIONS, SIGNALS
-from proxytune.files import shipped
+from proxytune.files import package_table, shipped
 from proxytune.learning.settings import KEYS as TEACHING_KEYS
 from proxytune.report.diagnosis.notes import VERDICTS
+from proxytune.report.html import WORDS
 from proxytune.search import ENGINES
 from proxytune.settings import read_settings
 from proxytune.starting import STOPPING
@@ -41,6 +42,8 @@ DOCUMENTS = {
 }
 README, ROBOTS, BENCHMARKS = (DOCUMENTS[f"{folder}README.md"] for folder in ("", "robots/", "benchmarks/"))
 COMMANDS_PAGE, STUDY, LOGS = (DOCS[f"reference/{name}.md"] for name in ("commands", "study", "logs"))
+
+ABOUT = package_table("report/templates/about.toml")
 
 LONGEST_README = 100
 """Lines: the README is read in one go; the rest is in docs/."""
@@ -223,6 +226,14 @@ def test_every_measure_is_spelt_out_and_has_its_formula(measure):
     words = row_of("explanation/usefulness.md", measure).split("|")[2].replace("-", " ").split()
     assert "".join(word[0] for word in words if word != "to").upper() in (measure, "SRCC")
     assert re.search(rf"^##+ .*\b{measure}\b", DOCS["method.md"], flags=re.MULTILINE)
+
+
+def test_a_page_s_foot_says_of_measures_and_of_the_answer_what_is_computed():
+    assert "Pearson" in WORDS["SRCC"]
+    assert "its mean over agents" in WORDS["MMRV"]
+    for text in (ABOUT["study"], DOCS["explanation/search.md"]):
+        said = " ".join(text.split())
+        assert "more than a standard deviation of a fresh score above the lowest: then it is the most probable" in said
 
 
 def test_every_room_is_on_the_page_about_architecture_in_order_and_every_name_on_that_of_the_api():

@@ -69,7 +69,7 @@ def plv_text(study: teaching.PlvStudy, files: Mapping[str, Any]) -> Group:
     box = ", ".join(f"{interval.name} [{interval.low:.4g}, {interval.high:.4g}]" for interval in study.space.intervals)
     by = " (narrowed to the θ whose PRPV is as low as the best, within noise)" if study.narrowed else ""
     converged = CONVERGED.format(f"{study.when.threshold:.1f}")
-    said = (f"searched: {box}{by}", f"stopped: {study.stopped}", PLV_MEANING, converged)
+    said = (f"searched: {box}{by}", f"stopped: {study.stopped}", PLV_MEANING, converged, *_cautions(study))
     first, last = f"{plv_answer(study)}\n", f"\n{CONFIRMED}:"
     return group_texts(first, head, tried, *said, *file_texts(files), last, finals, *study.unable.values())
 
@@ -82,11 +82,15 @@ def write_plv_report(study: teaching.PlvStudy, folder: Path) -> tuple[Path, Path
     finals, tried = _tables(study)
     stopped = Paragraphs("Why the search ended", (f"{study.stopped}.", f"{PLV_MEANING}."))
     picture = picture_of("teach", "plv", drawn)
-    finalists = replace(finals, notes=(PLV_MEANING, *study.unable.values()))
+    finalists = replace(finals, notes=(PLV_MEANING, *study.unable.values(), *_cautions(study)))
     title = f"{study.settings.name}: in which simulator does a learner learn most?"
     view = View(title, plv_answer(study), plv_next_step(study), (finalists, picture, tried, stopped))
     write_page(page, view, study_foot(study.settings))
     return figure, page
+
+
+def _cautions(study: teaching.PlvStudy) -> list[str]:
+    return list(filter(None, [teaching.caution_of_threshold(study.confirmed.needs)]))
 
 
 def _tables(study: teaching.PlvStudy) -> tuple[Table, Table]:
@@ -119,24 +123,27 @@ def plv_document(study: teaching.PlvStudy) -> dict[str, Any]:
     """A search by PLV as plain JSON; its keys are promises."""
     experiment, best = study.confirmed, teaching.best_teacher(study.confirmed)
     more = [teaching.saves_more(experiment, best.name, it.name) if best else None for it in experiment.teachers]
+    finalists = {
+        one.name: {
+            "theta": theta_document(one.proxy),
+            "zero_shot": one.zero_shot.value,
+            "plv": estimate_document(one.worth.plv if one.worth else None),
+            "plv_cost": estimate_document(one.cost),
+            "needed": estimate_document(one.worth.needed if one.worth else None),
+            "best_saves_more": estimate_document(saved),
+        }
+        for one, saved in zip(experiment.teachers, more, strict=True)
+    }
     return {
         "name": study.settings.name,
         "objective": "plv",
-        "best": _trial_document(study.best),
+        "best": {"index": None, "name": best.name, **finalists[best.name]} if best else None,
+        "best_trial": _trial_document(study.best),
+        "cautions": _cautions(study),
         "confirmed": {
             "best": best.name if best else None,
             "settled": experiment.settled,
-            "finalists": {
-                one.name: {
-                    "theta": theta_document(one.proxy),
-                    "zero_shot": one.zero_shot.value,
-                    "plv": estimate_document(one.worth.plv if one.worth else None),
-                    "plv_cost": estimate_document(one.cost),
-                    "needed": estimate_document(one.worth.needed if one.worth else None),
-                    "best_saves_more": estimate_document(saved),
-                }
-                for one, saved in zip(experiment.teachers, more, strict=True)
-            },
+            "finalists": finalists,
             "cannot_teach": dict(study.unable),
         },
         "trials": [_trial_document(trial) for trial in study.trials],

@@ -113,6 +113,8 @@ def teach_table(experiment: teaching.Experiment, prpv: Predictivities) -> Table:
     notes.append(CONVERGED.format(f"{experiment.when.threshold:.1f} of {experiment.best_score:g}"))
     if unknown := teaching.why_unknown(experiment.needs):
         notes.append(f"{unknown.reason}, so PLV is not known; {unknown.remedy}")
+    elif caution := teaching.caution_of_threshold(experiment.needs):
+        notes.append(caution)
     for lesson in experiment.teachers:
         factor = lesson.worth.factor if lesson.worth else None
         if factor is not None and factor.value is not None:

@@ -20,6 +20,7 @@ from .search import (
     PlvStudy as PlvStudy,
     PlvTrial as PlvTrial,
     best_teacher as best_teacher,
+    caution_of_threshold as caution_of_threshold,
     most_examinations as most_examinations,
     plv_or_worst as plv_or_worst,
     saves_more as saves_more,

@@ -138,6 +138,17 @@ def why_unknown(needs: learning.SampleNeeds) -> PlvUnknown | None:
     return None
 
 
+def caution_of_threshold(needs: learning.SampleNeeds) -> str:
+    """A caution where one counts as converged that has hardly learnt anything, so that PLV says little; else empty."""
+    alone, threshold = needs.draws.scores[learning.NONE].mean(axis=0), needs.when.threshold
+    first = float(alone[np.isfinite(alone)][0])
+    if threshold > first:
+        return ""
+    hardly = f"no more than a learner without a proxy scores after {needs.draws.first:g} samples ({first:.3g})"
+    remedy = "lower teaching.tolerance, or state a higher teaching.level"
+    return f"the score that counts as converged, {threshold:.3g}, is {hardly}, so PLV says little; {remedy}"
+
+
 OBJECTIVE = "plv"
 
 

@@ -44,7 +44,9 @@ def test_a_study_of_learning_value_tells_its_best_proxy(make_study, answered):
     document = answered("study", folder)
     plvs = [trial["plv"]["value"] for trial in document["trials"]]
     assert len(plvs) == 3
-    assert document["best"]["plv"]["value"] == max(plvs)
+    assert document["best_trial"]["plv"]["value"] == max(plvs)
+    finalist = document["confirmed"]["finalists"]["best single θ"]
+    assert document["best"] == {"index": None, "name": "best single θ", **finalist}
     assert document["confirmed"]["best"] == "best single θ"
     assert document["confirmed"]["finalists"]["best single θ"]["theta"].keys() == {"trim"}
     assert document["narrowed_by_prpv"] is False

@@ -10,7 +10,14 @@ from proxytune.learning import Costs, Distribution, LearningCurve, LearningEstim
 from proxytune.learning.plv import Published
 from proxytune.report.html import page_html
 from proxytune.report.plv_search import plv_answer, plv_next_step
-from proxytune.report.teaching import sorted_by_worth, teach_answer, teach_figure, teach_next_step, teach_view
+from proxytune.report.teaching import (
+    sorted_by_worth,
+    teach_answer,
+    teach_figure,
+    teach_next_step,
+    teach_table,
+    teach_view,
+)
 from proxytune.report.view import Column, foot_of
 from proxytune.teaching import Experiment, TeacherResult
 
@@ -92,6 +99,12 @@ def test_the_next_step_is_more_seeds_while_something_is_open_and_says_why_plv_is
     early = teach_next_step(experiment(alone=(49.0, 50.0, 50.0, 50.0)))
     assert early.startswith("add smaller numbers to teaching.target_samples, or lower teaching.tolerance: without a")
     assert "comes to 45 by 50 samples already" in early
+    low = experiment(alone=(47.0, 43.0, 48.0, 50.0))
+    told = (
+        "the score that counts as converged, 45, is no more than a learner without a proxy scores after 50 samples (4"
+    )
+    assert any(note.startswith(told) for note in teach_table(low, {}).notes)
+    assert not any("counts as converged" in note for note in teach_table(experiment(), {}).notes)
     rising = experiment(gain=5.1)
     assert "is unknown: without a proxy the score still rises by more than 5" in teach_answer(rising)
     assert teach_next_step(rising).startswith("raise teaching.target_samples: ")

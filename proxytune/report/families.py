@@ -19,7 +19,7 @@ from proxytune.report.text import file_texts, group_texts, note_texts, section_t
 from proxytune.report.view import Paragraphs, Table, View, columns_of
 from proxytune.report.wording import fixed, in_pairs, listed, short, span
 from proxytune.report.writing import ABOUT, picture_of
-from proxytune.study import BestFamilies, ComparedFamilies, Lesson, TunedFamily, settings_document
+from proxytune.study import NOTICEABLE, BestFamilies, ComparedFamilies, Lesson, TunedFamily, settings_document
 from proxytune.usefulness import Assessment, Difference
 
 Row = tuple[str, ...]
@@ -48,7 +48,7 @@ def families_answer(compared: ComparedFamilies) -> str:
     teach = [f"To teach: {_say_teaching(compared)}."] if compared.settings.teaching else []
     choice, times = compared.cheapest, compared.seconds_per_episode()
     assert choice.best is not None
-    more = {name: seconds_text(*one) for name, one in compared.times_cheapest(choice.best).items()}
+    more = {name: _ratio_text(*one) for name, one in compared.times_cheapest(choice.best).items()}
     alike = [f"{name} {more[name]}" for name in choice.alike]
     worse = [f"{name} {time}" for name, time in more.items() if name not in (choice.best, *choice.alike)]
     seconds = seconds_text(*times[choice.best], unit=" s per episode")
@@ -72,7 +72,7 @@ def families_next_step(compared: ComparedFamilies) -> str:
     means = {name: one[0] for name, one in compared.seconds_per_episode().items() if name in names}
     cheap = min(means, key=means.__getitem__)
     others = [one for name, one in compared.times_cheapest(cheap).items() if name in names and name != cheap]
-    if all(low > 1.0 for _, low, _ in others):
+    if all(low > NOTICEABLE for _, low, _ in others):
         return f"use {cheap} to predict, which costs least of those; to tell them apart, {told}."
     return f"to tell {listed(names)} apart, {told}."
 
@@ -89,10 +89,15 @@ def difference_text(one: Difference) -> str:
     return f"+{fixed(one.value, 0)}{ends}"
 
 
-def seconds_text(value: float, low: float, high: float, unit: str = "") -> str:
-    """Seconds, or a ratio, with its interval, to two significant figures."""
-    middle, *ends = (f"{float(f'{one:.2g}'):g}" for one in (value, low, high))
+def seconds_text(value: float, low: float, high: float, unit: str = "", figures: int = 2) -> str:
+    """Seconds, or a ratio, with its interval, to so many significant figures."""
+    middle, *ends = (f"{float(f'{one:.{figures}g}'):g}" for one in (value, low, high))
     return f"{middle}{unit} ({' to '.join(ends)})"
+
+
+def _ratio_text(value: float, low: float, high: float) -> str:
+    """A ratio with its interval; one that is shown to be above 1 is not told as 1."""
+    return seconds_text(value, low, high, figures=3 if NOTICEABLE < low < 1.05 else 2)
 
 
 def more_text(lesson: Lesson) -> str:

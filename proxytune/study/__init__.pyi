@@ -18,6 +18,7 @@ from .facts import (
     study_facts as study_facts,
 )
 from .families import (
+    NOTICEABLE as NOTICEABLE,
     BestFamilies as BestFamilies,
     ComparedFamilies as ComparedFamilies,
     Lesson as Lesson,

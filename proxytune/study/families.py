@@ -29,6 +29,9 @@ from proxytune.usefulness import Assessment, Difference, Expectation, expected_d
 
 RESAMPLES = 1000
 
+NOTICEABLE = 1.005
+"""Episodes that are shown to take this many times as long are called longer: a smaller ratio is told as 1."""
+
 
 @dataclass(frozen=True)
 class TunedFamily:
@@ -117,7 +120,7 @@ class ComparedFamilies:
     def cheapest(self) -> BestFamilies:
         """The one whose episodes take the shortest."""
         best = min(self._costs, key=lambda name: self._costs[name][0])
-        alike = [name for name, (_, low, _) in self.times_cheapest(best).items() if name != best and low <= 1.0]
+        alike = [name for name, (_, low, _) in self.times_cheapest(best).items() if name != best and low <= NOTICEABLE]
         return BestFamilies(best, tuple(alike))
 
     def seconds_per_episode(self) -> dict[str, tuple[float, float, float]]:

@@ -46,6 +46,11 @@ def test_nothing_is_claimed_of_chance_of_several_families_and_a_clear_winner_or_
     assert families_next_step(found).startswith("run the study again")
     found = compared(family("a", 0, CHEAP), family("b", 1, tuple(131.0 * one for one in CHEAP)))
     assert "times as long: b 130 (130 to 130)." in families_answer(found)
+    found = compared(family("a", 0, CHEAP), family("b", 1, tuple(1.03 * one for one in CHEAP)))
+    assert "times as long: b 1.03 (1.03 to 1.03)." in families_answer(found)
+    found = compared(family("a", 0, CHEAP, noise=8.0), family("b", 0, tuple(1.004 * one for one in CHEAP), noise=8.0))
+    assert "per episode (0.9 to 1.1); cannot be told from it: b 1 (1 to 1)." in families_answer(found)
+    assert families_next_step(found).startswith("to tell a and b apart")
 
 
 @pytest.mark.parametrize(

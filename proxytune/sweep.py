@@ -359,6 +359,7 @@ class Shape:
     best: tuple[float, ...]  # the values of the parameter where the measure is best; empty if it is defined nowhere
     score: float | None  # its score there
     near_best: tuple[float, ...]  # the values where it is not worse than the best beyond noise
+    worse: tuple[float, ...]  # those where it is; of others, without an interval, that is not known
     held: float | None  # where the parameter is held when others are swept; None if that was not said
     # what the measure does from there downwards: "worsens" if it never gets better again beyond noise and ends up
     # worse beyond noise, "flat" if neither, "turns" if it gets better again beyond noise, "unknown" where there
@@ -380,15 +381,18 @@ def shape_of(series: Series, held: float | None) -> Shape:
     sign = 1.0 if series.measure.lower_is_better else -1.0
     known = {value: one for value, one in series.estimates.items() if one.value is not None}
     if not known:
-        return Shape((), None, (), held, "unseen", "unseen")
+        return Shape((), None, (), (), held, "unseen", "unseen")
     # Turned such that lower is better.
     costs = sign * np.array([one.value for one in known.values()])
     ends = sign * np.array([one.interval or (-math.inf, math.inf) for one in known.values()])
     lows, highs = np.minimum(costs, ends.min(axis=1)), np.maximum(costs, ends.max(axis=1))
     values, best = list(known), costs == costs.min()
-    at_best, near_best = (tuple(itertools.compress(values, mask)) for mask in (best, lows <= highs[best].max()))
+    told = np.array([one.interval is not None for one in known.values()])
+    near = lows <= np.where(told, highs, costs)[best].max()
+    masks = (best, best | (told & near), told & ~near & ~best)
+    at_best, near_best, worse = (tuple(itertools.compress(values, mask)) for mask in masks)
     sides = (_side(values[::-1], lows[::-1], highs[::-1], held), _side(values, lows, highs, held))
-    return Shape(at_best, sign * float(costs.min()) + 0.0, near_best, held, *sides)
+    return Shape(at_best, sign * float(costs.min()) + 0.0, near_best, worse, held, *sides)
 
 
 def describe_shape(series: Series, held: float | None) -> str:
@@ -399,6 +403,9 @@ def describe_shape(series: Series, held: float | None) -> str:
     extreme = "lowest" if series.measure.lower_is_better else "highest"
     best, near = ", ".join(map(_number, shape.best)), _listed(shape.near_best, series)
     line = f"{series.name}: {extreme} ({shape.score:.3g}) at {best}; not worse beyond noise: {near}"
+    judged = {*shape.near_best, *shape.worse}
+    if unknown := [value for value, one in series.estimates.items() if one.value is not None and value not in judged]:
+        line += f" (noise not known at {', '.join(map(_number, unknown))})"
     if held is None or "unseen" == shape.below == shape.above:
         return line
     return f"{line}; from {_number(held)} downwards it {OUTWARDS[shape.below]}, upwards it {OUTWARDS[shape.above]}"

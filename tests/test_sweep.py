@@ -284,6 +284,11 @@ def test_the_score_of_a_shape_and_its_line_say_what_each_side_does():
     assert sweep.describe_shape(series([None, None]), 0.0) == "PRPV: undefined at every point"
     assert "from" not in sweep.describe_shape(series([9.0, 4.0, 1.0]), None)
     assert "not worse beyond noise: 0, 2" in sweep.describe_shape(series([1.0, 5.0, 1.0]), None)
+    wide = series([1.0, 5.0, 1.2, 3.0], 0.6)
+    untold = replace(wide, estimates={**wide.estimates, 3.0: sweep.Measured(3.0, None)})
+    assert "not worse beyond noise: 0, 2 (noise not known at 3)" in sweep.describe_shape(untold, None)
+    assert (sweep.shape_of(untold, None).near_best, sweep.shape_of(untold, None).worse) == ((0.0, 2.0), (1.0,))
+    assert sweep.shape_of(series([1.0, 5.0], None), None).near_best == (0.0,)
 
 
 @settings(max_examples=50)

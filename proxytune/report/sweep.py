@@ -185,7 +185,8 @@ def sweep_view(study: str, curves: Sequence[SweepCurve], figures: Mapping[str, D
     names, answer = listed([curve.parameter for curve in curves]), " ".join(f"{_lowest(curve)}." for curve in curves)
     title = f"{study}: how does usefulness depend on {names}?"
     step = "search all parameters at once with `python -m proxytune study`."
-    flat = [one.parameter for one in curves if len(shape_of(series_of(one)[0], None).near_best) == len(one.points)]
+    shapes = {one.parameter: shape_of(series_of(one)[0], None) for one in curves}
+    flat = [name for name, shape in shapes.items() if shape.near_best and not shape.worse]
     if flat:
         step = f"raise starts, or add agents whose scores change with {' or '.join(flat)}: noise hides a difference."
     return View(title, f"{answer} {held}.", step, tuple(parts))
@@ -198,7 +199,7 @@ def _lowest(curve: SweepCurve) -> str:
     if shape.score is None:
         return f"{curve.parameter}: {prpv.name} is undefined at every point"
     best, points = listed([short(value, 4) for value in shape.best]), len(curve.points)
-    worse = points - len(shape.near_best)
+    worse = len(shape.worse)
     beyond = f"worse beyond noise at {worse} of {points} values" if worse else "at no other value worse beyond noise"
     return f"{curve.parameter}: {prpv.name} is lowest ({shape.score:.3g}) at {best}, and {beyond}"
 

@@ -28,6 +28,7 @@ from proxytune.report.html import WORDS
 from proxytune.search import ENGINES
 from proxytune.settings import read_settings
 from proxytune.starting import STOPPING
+from proxytune.study.preflight import LOOKS, PAIRS
 from proxytune.study.settings import KEYS
 from proxytune.usefulness import MEASURES, PODS
 
@@ -43,7 +44,7 @@ DOCUMENTS = {
 README, ROBOTS, BENCHMARKS = (DOCUMENTS[f"{folder}README.md"] for folder in ("", "robots/", "benchmarks/"))
 COMMANDS_PAGE, STUDY, LOGS = (DOCS[f"reference/{name}.md"] for name in ("commands", "study", "logs"))
 
-ABOUT = package_table("report/templates/about.toml")
+ABOUT, CAPTIONS = (package_table(f"report/templates/{name}.toml") for name in ("about", "captions"))
 
 LONGEST_README = 100
 """Lines: the README is read in one go; the rest is in docs/."""
@@ -234,6 +235,13 @@ def test_a_page_s_foot_says_of_measures_and_of_the_answer_what_is_computed():
     for text in (ABOUT["study"], DOCS["explanation/search.md"]):
         said = " ".join(text.split())
         assert "more than a standard deviation of a fresh score above the lowest: then it is the most probable" in said
+
+
+def test_how_many_pairs_a_pre_flight_drives_and_when_two_agents_have_no_order_is_told():
+    told = " ".join(section(DOCS["explanation/search.md"], "Pre-flight").split())
+    assert f"there are {PAIRS // LOOKS} pairs of episodes" in told
+    assert f"about {PAIRS} pairs at most" in told
+    assert "no order where they tie or, with several metrics" in CAPTIONS["score"]["flipped_pairs"]["caption"]
 
 
 def test_every_room_is_on_the_page_about_architecture_in_order_and_every_name_on_that_of_the_api():

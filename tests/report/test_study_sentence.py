@@ -127,8 +127,10 @@ def test_the_next_step_asks_for_no_more_trials_or_starts_than_help():
     assert "raise starts from 4 to 5 " in said(**ABOVE, most_starts=5)
     assert "add agents or metrics: all 4 starts are driven" in said(**ABOVE, most_starts=4)
     told = said(**ABOVE, learn_from=("bank",), budget=0, trials=())
-    assert "raise budget from 0 to 8" in told
+    assert "raise budget from 0 to 8 (starts limit it too, but more of them would leave the earlier trials out)" in told
     assert "raise starts" not in told
+    by_trials = (replace(TOLD_BY_STARTS, limit="trials"),)
+    assert "starts limit" not in said(**ABOVE, learn_from=("bank",), budget=0, trials=(), information=by_trials)
 
 
 def test_a_proxy_that_lacks_something_is_sent_to_diagnose_with_effects_on_motion_if_its_robot_drives():

@@ -146,9 +146,10 @@ def _say_what_to_add(result: StudyResult) -> str:
         best = f" (so far {informed.agents[0][0]}'s do most)" if informed else ""
         log = ", or a log for `diagnose`" if settings.family == DEFAULT_FAMILY else ""
         return f"add an agent or a metric whose scores change with {plain(least.name)}{best}{log}"
-    # More starts than earlier studies were driven from would leave their trials out.
-    if settings.learn_from or informed is None or informed.limit != "starts":
+    if informed is None or informed.limit != "starts":
         return _more_trials(result)
+    if settings.learn_from:
+        return f"{_more_trials(result)} (starts limit it too, but more of them would leave the earlier trials out)"
     if settings.starts == most_starts:
         return f"add agents or metrics: all {settings.starts} starts are driven"
     more = min(2 * settings.starts, most_starts)

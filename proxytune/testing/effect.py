@@ -24,7 +24,7 @@ HELD = 3
 """Samples over which a command holds."""
 STANDS = 0.1
 """The share of commands that are to stand."""
-LENGTHS = {HELD: 2700, 15: 2700, 150: 1800}
+LENGTHS = {150: 1800, 15: 2700, HELD: 2700}
 """A signal over which every parameter must matter: samples of commands that hold so long."""
 PICTURE = {"camera_columns": 4.0, "camera_rows": 3.0}
 """The size of the pictures that image effects are tried on: no two sides alike, so that none is taken for the other."""

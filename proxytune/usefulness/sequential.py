@@ -23,7 +23,7 @@ import numpy as np
 from proxytune.arrays import Floats
 from proxytune.errors import ScoresError
 from proxytune.scores import ScoreTable
-from proxytune.usefulness.comparison import Comparison
+from proxytune.usefulness.comparison import Comparison, independence
 from proxytune.usefulness.decision import Decision
 from proxytune.usefulness.resampling import CONFIDENCE
 from proxytune.usefulness.saving import SORTED, is_sorted
@@ -123,6 +123,7 @@ class Sequential:
     # median of rounds to a decision, were the rates what they are, by bets with the proxy and without; None where
     # more than half take beyond 1000
     expected_rounds: Mapping[str, int | None]
+    independent: float  # the least share of an agent's rollouts that counts as independent; the test supposes all
 
 
 def sequential_test(inputs: Comparison, column: int = 0, *, seed: int = 0) -> Sequential:
@@ -156,7 +157,8 @@ def sequential_test(inputs: Comparison, column: int = 0, *, seed: int = 0) -> Se
     rng = np.random.default_rng(seed)
     bets = {"with proxy": bet, "without proxy": None}
     expected = {name: expected_rounds(rates, each, rng) for name, each in bets.items()}
-    return Sequential(winner, at, rounds, evidence, threshold, expected)
+    independent = float(independence(inputs.target, column).min())
+    return Sequential(winner, at, rounds, evidence, threshold, expected, independent)
 
 
 def _rollouts(table: ScoreTable, column: int, direction: str) -> list[Floats]:

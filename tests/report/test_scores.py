@@ -6,13 +6,23 @@ import numpy as np
 import pytest
 from score_tables import table_of
 
-from proxytune.report.decision import choices_sentences, decision_table
+from proxytune.report.decision import choices_sentences, decision_table, sequential_sentence
 from proxytune.report.score_figures import FLIP_COLOURS, LONGEST, MOST, flipped_pairs_figure, scatter_figure
 from proxytune.report.scores import score_next_step, score_sentence, write_score_report
 from proxytune.report.view import foot_of
 from proxytune.report.writing import save_figure
 from proxytune.scores import Metric, ScoreTable
-from proxytune.usefulness import assess, assess_each, select_proxy
+from proxytune.usefulness import Sequential, assess, assess_each, select_proxy
+
+
+def test_a_sequential_test_is_doubted_where_repeats_of_a_start_are_alike():
+    found = Sequential("a", 7, 60, {"a": 25.0, "b": 0.1}, 20.0, {}, independent=0.1)
+    assert sequential_sentence(found).startswith(
+        "a is shown to be the best, after 7 of 60 rollouts of each agent; but "
+    )
+    assert "only 10 % of rollouts count as independent" in sequential_sentence(found)
+    assert "but" not in sequential_sentence(replace(found, independent=0.8))
+
 
 M = (Metric("distance"),)
 EVIL = "<script>alert(1)</script>"

@@ -216,6 +216,16 @@ def test_a_winner_is_shown_before_the_end_and_sooner_with_a_proxy():
     assert both["with proxy"] == pytest.approx(both["without proxy"], rel=0.4)
 
 
+@pytest.mark.parametrize(("alike", "least"), [(True, 0.0), (False, 0.7)])
+def test_a_test_says_how_many_of_its_rollouts_count_as_independent(alike, least):
+    single = rolled([0.7, 0.4], 6 if alike else 60, seed=3)
+    values = np.repeat(single.values, 10, axis=1) if alike else single.values
+    labels = tuple(f"{number // 10}/{number % 10}" for number in range(60))
+    target = ScoreTable(single.agents, labels, single.metrics, values)
+    found = looked_at(target, target).independent
+    assert least < found <= (0.11 if alike else 1.0)
+
+
 @pytest.mark.parametrize(
     ("values", "complaint"),
     [

@@ -64,7 +64,7 @@ def next_sentence(plan: Plan, target: str) -> str:
 
 
 MOSTLY = 0.5
-"""A sequential test is doubted where a smaller share of rollouts counts as independent, which few starts tell roughly."""
+"""A sequential test is doubted where a smaller share of rollouts counts as independent; few starts tell it roughly."""
 
 
 def sequential_sentence(found: Sequential) -> str:

@@ -34,7 +34,7 @@ from proxytune.files import shipped
 from proxytune.importing import Wanted, read_source
 from proxytune.learning import Cache
 from proxytune.logs import read_log
-from proxytune.loop.comparison import compare_errors, following, lacking, level_text
+from proxytune.loop.comparison import compare_errors, lacking, level_text, next_step
 from proxytune.loop.diagnosing import read_diagnosis
 from proxytune.loop.episodes import pictures_file, read_pictures
 from proxytune.loop.opening import Kept
@@ -171,7 +171,7 @@ def read_a_diagnosis(home: Path) -> object:
     """As a loop reads it and prints it."""
     found = read_diagnosis(home)
     rows = [level_text(row.before, row.unit) for row in compare_errors(found)]
-    return json.dumps([lacking(found), following(found, "", "model.toml", {}), rows, found], allow_nan=False)
+    return json.dumps([lacking(found), next_step(found, "", "model.toml", {}), rows, found], allow_nan=False)
 
 
 def write_runs(home: Path, finished: Path) -> None:

@@ -56,7 +56,7 @@ def test_each_episode_runs_on_one_thread():
 
 FAULTS = {
     "raises": "agent 'agent0' raised ValueError at 1.20 s: it lost its way",
-    "crashes": "the domain family raised ZeroDivisionError: division by zero (wobbly.py, line 86)",
+    "crashes": "the domain family raised ZeroDivisionError: division by zero (wobbly.py, line 87)",
     "nan": "agent 'agent0': the domain family gave no finite 'distance'",
 }
 

@@ -35,7 +35,7 @@ BAD = {
     "no such factory": ({"family": '"wobbly:wobly"'}, "'wobbly:wobly': wobbly has no 'wobly'; did you mean 'wobbly'?"),
     "a factory with a bug": (
         {"family": '"wobbly:broken_factory"'},
-        "raised KeyError: 'robot' (wobbly.py, line 124); correct it",
+        "raised KeyError: 'robot' (wobbly.py, line 125); correct it",
     ),
     "a factory without a model": (
         {"family": '"wobbly:domain_alone"'},

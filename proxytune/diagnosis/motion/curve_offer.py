@@ -22,7 +22,7 @@ TIME_STEP_S, TIME_KNOTS = 2.0, 40
 """Between the knots of a curve over time, farther apart where a drive is so long that these would be more."""
 OTHER_KNOTS = 5
 """Knots of a curve over the other wheel's speed."""
-MESHES_M = (0.25, 0.5, 1.0, 2.0)
+MESHES_M = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0)
 MOST_CORNERS, MOST_ON_AXIS, MOST_OF_TRACKER = 100, 16, 40
 """Meshes of the lattices of a map of the floor, of curves over x or y, and of a tracker's map; their most corners."""
 SAME_PLACE_M = 1e-3

@@ -35,6 +35,17 @@ def test_groups_are_offered_in_their_order_with_knots_within_what_was_driven(dri
     assert "wheel_speed" in groups
 
 
+@pytest.mark.parametrize("size_m", [2.0, 20.0, 100.0])
+def test_places_are_learnt_on_a_table_in_a_hall_and_outdoors(drives, size_m):
+    within = drives.poses[..., :2]
+    poses = drives.poses.copy()
+    poses[..., :2] = (within - within.min(axis=(0, 1))) / np.ptp(within, axis=(0, 1)) * size_m
+    knots = {curve.group: np.array(curve.knots) for curve in offer_curves(replace(drives, poses=poses), TRUTH).curves}
+    for axis in "xy":
+        assert 3 <= len(knots[axis]) <= 16
+        assert np.ptp(knots[axis]) > 0.8 * size_m
+
+
 def test_knots_over_use_reach_as_far_as_the_drive_that_was_used_most(drives):
     duties = np.full_like(drives.duties, 0.1)
     duties[2] = 0.6

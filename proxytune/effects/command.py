@@ -93,8 +93,8 @@ class ReversalState(NamedTuple):
 class ReversalPause(ShippedEffect):
     """The motor driver lets a wheel rest for `pause` before it drives it the other way.
 
-    Of a stand before the command to turn round, a share `stand` counts as rest. A constant delay may come before or
-    after; it comes after, since it blends commands, so that their signs would hang on it.
+    Of a stand before the command to turn round, a share `stand` counts as rest. The delay comes after it: it blends
+    neighbouring commands, and the sign of a blend would depend on the delay.
     """
 
     pause: float = parameter("s", 0.0, 5.0, probes=(0.05, 0.1, 0.2, 0.4, 0.8, 1.6), usual=(0.0, 2.0),

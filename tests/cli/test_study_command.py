@@ -54,7 +54,8 @@ def test_a_parameter_that_does_nothing_is_said_before_the_study_and_recorded(mak
     out, told = capsys.readouterr()
     out = " ".join(out.split())
     assert "pre-flight 'dead' changes nothing at all" in out
-    assert f"0 run, {7 * 18 + found['episodes']} reused" in out
+    # Seven trials and the neutral values of its parameters, each of 18 episodes
+    assert f"0 run, {8 * 18 + found['episodes']} reused" in out
     assert told == "", "a finished study has no progress to tell of"
 
 

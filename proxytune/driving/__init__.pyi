@@ -3,6 +3,7 @@ from .agents import AGENTS as AGENTS, NEEDS as NEEDS, load_agent as load_agent
 from .bullet import BulletPlant as BulletPlant, has_pybullet as has_pybullet
 from .cameras import GroundPlaneCamera as GroundPlaneCamera
 from .episode import (
+    COMMAND_FORM as COMMAND_FORM,
     METRICS as METRICS,
     TICK_HZ as TICK_HZ,
     Course as Course,

@@ -200,7 +200,7 @@ def _ask_together(act: Callable[[list[Any]], Any], memories: list[Any]) -> tuple
     return (commands, kept) if sound else None
 
 
-TWO = "a command is two duties, left and right, or a car's throttle and steering"
+COMMAND_FORM = "a command is two duties, left and right, or a car's throttle and steering"
 """What an answer must be."""
 
 
@@ -219,10 +219,10 @@ def command_of(answer: Any, time_s: float) -> Command:
         command = np.asarray(answer, dtype=float)
     except Exception as problem:
         told = f"answered with a {type(answer).__name__} at {time_s:.2f} s: {problem}"
-        raise EpisodeError(f"{told}; {TWO}") from problem
+        raise EpisodeError(f"{told}; {COMMAND_FORM}") from problem
     if command.shape != (2,):
         told = f"answered with shape {command.shape} at {time_s:.2f} s"
-        raise EpisodeError(f"{told}; {TWO}")
+        raise EpisodeError(f"{told}; {COMMAND_FORM}")
     if not (math.isfinite(command[0]) and math.isfinite(command[1])):
         raise EpisodeError(f"answered {command.tolist()} at {time_s:.2f} s; duties must be finite")
     return command

@@ -91,7 +91,7 @@ class Chords(NamedTuple):
 
 
 def _chords(episode: LogEpisode) -> Chords:
-    times, poses = episode.as_measured
+    times, poses = episode.measured_poses
     later = np.searchsorted(times, times + CHORD_S - 1e-9)
     here = np.flatnonzero(later < len(times))
     later = later[here]
@@ -169,7 +169,7 @@ def _frozen(log: Log, asked: Sequence[tuple[Floats, Floats]]) -> Iterator[str]:
     """Tell where poses stay the same to the last digit while it is told to drive on."""
     large = LARGE * float(np.quantile(np.abs(np.concatenate([speed for speed, _ in asked])), 0.95))
     for episode, (speed, _) in zip(log.episodes, asked, strict=True):
-        times, poses = episode.as_measured
+        times, poses = episode.measured_poses
         driving = np.interp(times, episode.times, np.abs(speed)) > max(large, 1e-9)
         changes = np.flatnonzero(np.append(len(poses) > 0, (np.diff(poses, axis=0) != 0.0).any(axis=1)))
         ends = np.append(changes, len(times))[1:]

@@ -141,7 +141,7 @@ def _read_instants(path: Path, samples: Rows, episodes: Sequence[LogEpisode]) ->
     drives = np.array([order[name] for name in rows.names])[rows.episode]
     times, spans = rows.values["time"], np.full((len(episodes), 2), np.nan)
     for span, episode in zip(spans, episodes, strict=True):
-        measured, _ = episode.as_measured
+        measured, _ = episode.measured_poses
         if len(measured):
             span[:] = measured[0], measured[-1]
     begins, ends = spans[drives].T

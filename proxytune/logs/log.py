@@ -71,7 +71,7 @@ class LogEpisode:
     measured: Measured | None = None
 
     @property
-    def as_measured(self) -> tuple[Floats, Floats]:
+    def measured_poses(self) -> tuple[Floats, Floats]:
         """Times (N,) [s] and poses (N, 3) of the drive as they were measured, those left out that have no place."""
         times, poses = (self.times, self.poses) if self.measured is None else self.measured[:2]
         known = np.isfinite(poses[:, 0])

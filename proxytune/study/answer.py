@@ -204,12 +204,8 @@ def confirmation_of(run: StudyRun, trials: Sequence[TrialRecord], learnt: Knowle
     tables = [table for one in answer.fresh if (table := _table(run.study, one))]
     expected = _expect(run, tables, _donors(run, driven)) if tables else None
     if expected and (table := _table(run.study, *answer.fresh)):
-        # All repetitions together break ties by a single crash: what is told is the mean of each by itself
-        mean, low, high = expected.prpv.value
-        value, whole = round(mean), assess(proxy=table, target=run.study.target, metrics=settings.metrics)
-        inner = replace(whole.prpv_interval, value=value, low=low, high=high)
-        told = replace(whole, prpv=replace(whole.prpv, value=value), prpv_interval=inner, noise_floor=expected.floor)
-        answer = replace(answer, assessment=told)
+        whole = assess(proxy=table, target=run.study.target, metrics=settings.metrics)
+        answer = replace(answer, assessment=whole.as_expected(expected))
     return Confirmation(answer, tuple(driven), settings.confirm * each, expected, again)
 
 

@@ -17,7 +17,17 @@ from numpy.typing import NDArray
 from proxytune import search
 from proxytune.arrays import Floats
 from proxytune.domain import DomainFamily, Episode, make_episode
-from proxytune.driving import NEEDS, Agent, GroundPlaneCamera, Picture, Robot, draw_floor, read_robot, shipped_map
+from proxytune.driving import (
+    COMMAND_FORM,
+    NEEDS,
+    Agent,
+    GroundPlaneCamera,
+    Picture,
+    Robot,
+    draw_floor,
+    read_robot,
+    shipped_map,
+)
 from proxytune.errors import EpisodeError, InputError
 from proxytune.running import working
 from proxytune.scores import Metric, ScoreTable
@@ -50,8 +60,7 @@ def check_agent(agent: Agent | type[Agent], *, robot: Robot | None = None) -> No
     alone = _driven(made, what, robot, seen)
     for tick, command in enumerate(alone):
         told = f"{what} answers picture {tick} with {command.tolist()}"
-        two = "a command is two duties, left and right, or a car's throttle and steering"
-        claim(command.shape == (2,), f"{told}; {two}")
+        claim(command.shape == (2,), f"{told}; {COMMAND_FORM}")
         claim(np.isfinite(command).all() and np.abs(command).max() <= 1.0, f"{told}; duties lie within [-1, 1]")
     again = _driven(made, what, robot, seen)
     claim(np.array_equal(alone, again), f"{what} drives otherwise the second time; keep all it learns in its memory")

@@ -22,6 +22,7 @@ from proxytune.settings import check_whole
 from proxytune.usefulness import resampling
 from proxytune.usefulness.comparison import Comparison, compare, repeats
 from proxytune.usefulness.decision import ASKED, Asked, Decision, Difference, Together, chosen, compare_all, decide
+from proxytune.usefulness.expectation import Expectation
 from proxytune.usefulness.noise import Chance, NoiseFloor, SuccessRates, chance, noise_floor, success_rates
 from proxytune.usefulness.pairs import Prpv, prpv, prpv_of_means
 from proxytune.usefulness.predictivity import Correlation, Mmrv, Ppv, kendall_tau, mmrv, ppv, srcc
@@ -84,6 +85,16 @@ class Assessment:
         low, high = self.prpv_interval.low, self.prpv_interval.high
         ends = "" if low is None or high is None else f" ({low:.3g} to {high:.3g})"
         return f"Assessment: PRPV {self.prpv.value}{ends} of at most {self.prpv.range[1]}"
+
+    def as_expected(self, expected: Expectation) -> "Assessment":
+        """The same with the PRPV that is expected of each repetition by itself, its interval and noise floor.
+
+        All repetitions together, which it was made of, break ties by a single crash.
+        """
+        mean, low, high = expected.prpv.value
+        value = round(mean)
+        inner = replace(self.prpv_interval, value=value, low=low, high=high)
+        return replace(self, prpv=replace(self.prpv, value=value), prpv_interval=inner, noise_floor=expected.floor)
 
     @cached_property
     def saves(self) -> Saving:

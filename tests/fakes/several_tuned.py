@@ -1,6 +1,5 @@
 """Several tuned families, made up of tables, seconds and learning values."""
 
-from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
 from types import SimpleNamespace
@@ -34,11 +33,7 @@ def family(name, shift=0, seconds=(1.0, 1.1, 0.9, 1.0), noise=0.1, fresh=True):
     target, tables = table(0, 0.1), [table(shift, noise, repetition) for repetition in range(3)]
     twice = [np.stack([one.values, other.values]) for one, other in combinations(tables, 2)]
     expected = expect(fresh=tables, target=target, metrics=METRICS, donors=donors_of(twice, 1)) if fresh else None
-    assessment = assess(proxy=tables[0], target=target, metrics=METRICS) if fresh else None
-    if assessment:
-        mean, low, high = expected.prpv.value
-        inner = replace(assessment.prpv_interval, low=low, high=high)
-        assessment = replace(assessment, prpv=replace(assessment.prpv, value=round(mean)), prpv_interval=inner)
+    assessment = assess(proxy=tables[0], target=target, metrics=METRICS).as_expected(expected) if fresh else None
     study = SimpleNamespace(target=target, settings=SimpleNamespace(home=Path("study") / "families" / name))
     known = {"fresh": assessment, "expected": expected, "episode_seconds": seconds}
     return SimpleNamespace(name=name, **known, result=SimpleNamespace(study=study))

@@ -214,13 +214,13 @@ def sandwich_intervals(
         inverse = np.linalg.pinv(hessian[np.ix_(chosen, chosen)] + KEPT_SOLVABLE * np.eye(len(chosen)), hermitian=True)
         return np.asarray(np.square(gradients[:, chosen] @ inverse).sum(axis=0))
 
-    spans = [span(coordinate, drives) for coordinate in free]
-    ends = [drives.rules.at_end(theta[names[0]], own) for names, own in zip(free, spans, strict=True)]
+    ranges = [span(coordinate, drives) for coordinate in free]
+    ends = [drives.rules.at_end(value, own) for value, own in zip(values_at(theta, free), ranges, strict=True)]
     inside, spread = np.flatnonzero(~np.array(ends, dtype=bool)), variances(np.arange(len(free)))
     spread[inside] = variances(inside)
     spread *= len(gradients) / max(1, len(gradients) - len(free))
     found: dict[str, tuple[float, float]] = {}
-    for coordinate, (low, high), variance in zip(free, spans, spread, strict=True):
+    for coordinate, (low, high), variance in zip(free, ranges, spread, strict=True):
         half = NORMAL_95 * float(np.sqrt(variance)) * (high - low)
         found |= {name: (max(low, theta[name] - half), min(high, theta[name] + half)) for name in coordinate}
     return found

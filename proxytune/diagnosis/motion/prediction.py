@@ -244,10 +244,8 @@ def predict(log: Log, robot: Robot, theta: Theta, horizon_s: float) -> pd.DataFr
         raise LogError(f"{log.name}: no measured pose to start a window from")
     ticks = round(whole.tick_hz / log.rate_hz)
     # Drives whose increments are the windows' beginnings alone.
-    first, number = (
-        np.concatenate(starts) * ticks + whole.lead,
-        np.repeat(np.arange(len(starts)), [len(rows) for rows in starts]),
-    )
+    first = np.concatenate(starts) * ticks + whole.lead
+    number = np.repeat(np.arange(len(starts)), [len(rows) for rows in starts])
     begins = [as_measured(one)[0][rows] for one, rows in zip(log.episodes, starts, strict=True)]
     both, block = np.repeat(np.concatenate(begins)[:, None], 2, axis=1), np.zeros_like(first)
     windows = replace(whole, episode=number, first=first, last=first, poses=both, block=block)

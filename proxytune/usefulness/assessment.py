@@ -3,9 +3,9 @@
 `assess` takes two score tables to an Assessment: PRPV, PPV, correlations and MMRV with their bootstrap intervals, the
 noise floor and chance. `select_proxy` ranks several proxies by PRPV, with intervals of
 
-    PRPV(worse) − PRPV(better) ± q · standard deviation over resamples
+    PRPV(worse) − PRPV(better) ± q · n / (n − 1) · standard deviation over resamples
 
-where q, one for all pairs, is the 95 % quantile of the largest studentised deviation.
+where q, one for all pairs, is the 95 % quantile of the largest studentised deviation, and n the fewest starts.
 """
 
 from collections.abc import Mapping, Sequence
@@ -280,7 +280,9 @@ def select_proxy(
     """Rank proxies by PRPV, and tell by a paired bootstrap which differences are beyond noise.
 
     All proxies meet the same resampled target. The intervals are simultaneous: their width is set by the largest
-    studentised deviation among all differences, so that looking at many pairs makes no false find more likely.
+    studentised deviation among all differences, so that looking at many pairs makes no false find more likely. A
+    bootstrap of n starts sees √((n − 1)/n) of their deviation, and four say little of what that is: the width is
+    n/(n − 1) times its own, by which equal proxies are told apart as seldom as it says.
     """
     if not proxies:
         raise ScoresError("no proxy is given; name at least one")
@@ -300,6 +302,14 @@ def select_proxy(
     deviation = differences.std(axis=1)
     centred = np.abs(differences - differences.mean(axis=1, keepdims=True))
     studentised = centred / np.where(deviation > 0, deviation, np.inf)[:, None]
-    half = np.asarray(np.quantile(studentised.max(axis=0), resampling.CONFIDENCE) * deviation, dtype=np.float64)
+    fewest = {name: min(_starts(side.proxy), _starts(side.target)) for name, side in inputs.items()}
+    starts = np.array([min(fewest[name] for name in pair) for pair in pairs])
+    half = np.quantile(studentised.max(axis=0), resampling.CONFIDENCE) * deviation * starts / (starts - 1)
     rows = zip(pairs, observed, half, strict=True)
     return Selection(ranking, tuple(Difference(*pair, int(v), float(v - h), float(v + h)) for pair, v, h in rows))
+
+
+def _starts(table: ScoreTable) -> int:
+    """The fewest starts of an agent; where one has a single start, the fewest repeats."""
+    starts = int((repeats(table) > 0).sum(axis=1).min())
+    return starts if starts > 1 else int(table.counts.min())

@@ -156,11 +156,14 @@ def test_differences_are_of_prpv_and_none_of_a_proxy_with_itself():
 
 
 @pytest.mark.slow
-def test_equally_good_proxies_are_seldom_told_apart():
+@pytest.mark.parametrize(("names", "starts"), [("ab", 4), ("ab", 10), ("abc", 10)])
+def test_equally_good_proxies_are_seldom_told_apart_even_by_four_starts(names, starts):
     false = 0
-    for seed in range(0, 600, 4):
-        proxies = {name: noisy(TRUTH / 4, seed + i, noise=1.0) for i, name in enumerate("abc")}
-        target = noisy(TRUTH / 4, seed + 3, noise=1.0)
+    for seed in range(0, 800, 4):
+        proxies = {
+            name: noisy(TRUTH / 4, seed + place, noise=1.0, episodes=starts) for place, name in enumerate(names, 1)
+        }
+        target = noisy(TRUTH / 4, seed, noise=1.0, episodes=starts)
         selection = select_proxy(proxies=proxies, target=target, metrics=CLEAR, resamples=300, seed=seed)
         false += any(pair.beyond_noise for pair in selection.differences)
-    assert false / 150 <= 0.10
+    assert false / 200 <= 0.08

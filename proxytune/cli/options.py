@@ -52,6 +52,7 @@ def wanted_of(arguments: argparse.Namespace) -> Wanted:
         commands=arguments.commands,
         poses=arguments.poses,
         frames=arguments.pictures,
+        wheels=arguments.wheel_speeds,
         stamps=arguments.stamps,
         columns=pairs_in("--columns", arguments.columns, "OURS=THEIRS or OURS=THEIRS:UNIT, as in x=pos_x:mm"),
         kind=arguments.kind,

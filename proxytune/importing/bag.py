@@ -17,7 +17,7 @@ from proxytune.arrays import Floats, Whole
 from proxytune.errors import LogError, ProxytuneError, to_install
 from proxytune.importing.bag_chunks import check_bag_size, check_messages_size
 from proxytune.importing.checks import headings_and_tilts
-from proxytune.importing.source import Commands, Poses
+from proxytune.importing.source import Commands, Poses, Wheels
 from proxytune.settings import nearest
 
 ROS1 = ".bag"
@@ -206,6 +206,7 @@ def _clock_notes(header: Floats, received: Floats, where: str) -> tuple[str, ...
 
 
 Row = tuple[float, ...]
+SIDES = ("left", "right")
 
 
 def collect(bag: Bag, topic: str, row_of: Callable[[Any], Row], *, finite: bool = True) -> tuple[Stamps, Floats]:
@@ -258,6 +259,40 @@ def read_poses(bag: Bag, topic: str, stamps: str) -> tuple[Poses, tuple[str, ...
     return Poses(times, rows[:, :3], *headings_and_tilts(rows[:, 3:], where)), notes
 
 
+def read_wheels(bag: Bag, topic: str, stamps: str) -> tuple[Wheels, tuple[str, ...]]:
+    """The measured wheel speeds of a topic of joints, and what there is to say of their times.
+
+    A side with several wheels turns as fast as they do on average. Messages of other joints are passed over. Angles are
+    differentiated where no velocity is measured, or every one is 0.
+    """
+    names: dict[str, None] = {}
+
+    def row_of(message: Any) -> Row:
+        names.update(dict.fromkeys(message.name))
+        sides = [[place for place, name in enumerate(message.name) if side in name.lower()] for side in SIDES]
+        wheels = [[place for place in side if "wheel" in message.name[place].lower()] for side in sides]
+        sides = wheels if all(wheels) else sides
+        velocity, position = (dict(enumerate(map(float, values))) for values in (message.velocity, message.position))
+        means = [sum(velocity.get(place, math.nan) for place in side) / max(1, len(side)) for side in sides]
+        angles = [position.get(place, math.nan) for side in sides for place in side[:1]]
+        return (*means, *angles) if all(sides) else (math.nan,) * 4
+
+    both, rows = collect(bag, topic, row_of, finite=False)
+    times, notes = choose_times(both, stamps, topic)
+    differentiated = not np.nan_to_num(rows[:, :2]).any() and bool(np.nan_to_num(rows[:, 2:]).any())
+    values = rows[:, 2:] if differentiated else rows[:, :2]
+    known = np.isfinite(values).all(axis=1)
+    times, first = np.unique(times[known], return_index=True)
+    values = values[known][first]
+    if len(times) < 2:
+        needed = "needs two messages or more with velocities or angles of a left and a right wheel"
+        raise LogError(f"{bag.path}: {topic}: {needed}, but has joints {', '.join(names) or 'none'}")
+    if differentiated:
+        values = np.gradient(np.unwrap(values, axis=0), times, axis=0)
+        notes = (*notes, f"{topic} measures no velocities: they are how fast its angles change.")
+    return Wheels(times, values), notes
+
+
 def header_ns(message: Any) -> int | None:
     """The stamp in a message's header [ns], or None where the type has none."""
     header = getattr(message, "header", None)
@@ -292,7 +327,7 @@ def _array(message: Any) -> Row:
 
 def _joints(message: Any) -> Row:
     pairs = dict(zip(message.name, message.velocity, strict=False))
-    sides = [[speed for name, speed in pairs.items() if side in name.lower()] for side in ("left", "right")]
+    sides = [[speed for name, speed in pairs.items() if side in name.lower()] for side in SIDES]
     if [len(side) for side in sides] != [1, 1]:
         names = ", ".join(message.name) or "none"
         raise LogError(f"needs the velocities of one left and one right joint, but has joints {names}")

@@ -94,6 +94,7 @@ FORMS: Mapping[Callable[[Path], object], Callable[[Path, Wanted], Source]] = {
 ONLY_FOR: Mapping[str, tuple[str, str, Sequence[object]]] = {
     "vesc": ("--vesc", "bags", (read_bag,)),
     "stamps": ("--stamps", "bags", (read_bag,)),
+    "wheels": ("--wheel-speeds", "bags (a table's wheels are named by --columns)", (read_bag,)),
     "poses": ("--poses", "bags and MRCLAM", (read_bag, read_mrclam)),
     "frames": ("--pictures", "bags and .npz", (read_bag, read_arrays)),
     "columns": ("--columns", "tables and arrays", (read_arrays, read_tum, read_csv_tables)),

@@ -124,6 +124,7 @@ class Wanted:
     commands: str = ""  # topic of the commands; "none" for a log without them
     poses: str = ""  # topic of the poses, or parent and child of a transform as "map>base_link"
     frames: str = ""  # topic of the pictures; "none" to leave them out
+    wheels: str = ""  # topic of joints with measured wheel speeds, of a bag; taken only if named
     stamps: str = "header"  # whose times count: "header" (when it was measured) or "receive" (when it was written down)
     # of a table or of arrays: our name to theirs, with the unit where it is not ours, as in {"time":
     # "stamp_ns:ns", "x": "pos_x_mm:mm", "heading": "yaw_deg:deg", "v": "cmd_lin"}

@@ -9,7 +9,16 @@ from pathlib import Path
 
 from proxytune.errors import LogError
 from proxytune.files import package_table
-from proxytune.importing.bag import COMMAND_TYPES, Topic, bags_in, form_of, open_bag, read_commands, read_poses
+from proxytune.importing.bag import (
+    COMMAND_TYPES,
+    Topic,
+    bags_in,
+    form_of,
+    open_bag,
+    read_commands,
+    read_poses,
+    read_wheels,
+)
 from proxytune.importing.bag_scene import TRANSFORMS, choose_transform, read_chain, read_pictures, read_transforms
 from proxytune.importing.source import Channel, Drive, Source, Wanted, told_once
 from proxytune.importing.vesc import KIND as VESC, pair_topics, read_vesc, servo_of
@@ -57,15 +66,13 @@ class Role:
             return f"bags without messages of it: {topic.lacking}"
         if not topic.known:
             return f"the bag does not define {topic.kind}; record it by a newer ROS or as mcap, which does"
-        if self.can_be(topic):
-            return f"taken only where it is named ({self.option})"
         return f"{topic.kind} is none of {', '.join(self.ranks)}"
 
 
 KIND_OF = {name: kind for name, (kind, _) in COMMAND_TYPES.items()} | {short(VESC): "speed_steering"}
 """The kind of command that a type of message says; empty where it says none."""
 ROLES = package_table("importing/roles.toml")
-COMMAND_ROLE, POSE_ROLE, PICTURE_ROLE = (Role(name, **table) for name, table in ROLES.items())
+COMMAND_ROLE, POSE_ROLE, WHEEL_ROLE, PICTURE_ROLE = (Role(name, **table) for name, table in ROLES.items())
 
 
 @dataclass(frozen=True)
@@ -79,6 +86,7 @@ class Choice:
     kind: str
     poses: Topic
     transform: str
+    wheels: Topic | None
     pictures: Topic | None
 
     @property
@@ -102,14 +110,16 @@ def choose(topics: tuple[Topic, ...], wanted: Wanted, where: str) -> Choice:
     role = replace(POSE_ROLE, ranks={"TFMessage": 0, "tfMessage": 0}) if transform else POSE_ROLE
     if (poses := _choose(role, topics, "" if transform else wanted.poses, where)) is None:
         raise LogError(_nothing(role, topics, where))
+    wheels = _choose(WHEEL_ROLE, topics, wanted.wheels, where)
     pictures = None if wanted.frames == "none" else _choose(PICTURE_ROLE, topics, wanted.frames, where)
     kind = "none" if commands is None else _kind_of(commands, wanted.kind, where)
-    return Choice(commands, kind, poses, transform, pictures)
+    return Choice(commands, kind, poses, transform, wheels, pictures)
 
 
 def roles_of(choice: Choice) -> tuple[tuple[Role, Topic | None], ...]:
     """The topic taken in each role."""
-    return (COMMAND_ROLE, choice.commands), (POSE_ROLE, choice.poses), (PICTURE_ROLE, choice.pictures)
+    taken = (choice.commands, choice.poses, choice.wheels, choice.pictures)
+    return tuple(zip((COMMAND_ROLE, POSE_ROLE, WHEEL_ROLE, PICTURE_ROLE), taken, strict=True))
 
 
 def channels_of(topics: tuple[Topic, ...], choice: Choice) -> tuple[Channel, ...]:
@@ -167,6 +177,8 @@ def _taken_for(topic: Topic, choice: Choice) -> str:
         return COMMAND_ROLE.name
     if fitting := [role for role, _ in roles if role.is_offered(topic)]:
         return f"left out: could be {fitting[0].name} as well ({fitting[0].option})"
+    if named := [role.option for role, _ in roles if role.can_be(topic)]:
+        return f"left out: taken only where it is named ({' or '.join(named)})"
     near = [role for role, _ in roles if short(topic.kind) in role.ranks]
     return f"left out: {near[0].why_not(topic)}" if near else "left out: neither commands, poses nor pictures"
 
@@ -219,7 +231,7 @@ def _list(path: Path, bags: dict[str, Path]) -> tuple[tuple[Topic, ...], list[st
 
 def _read_drive(name: str, path: Path, choice: Choice, wanted: Wanted) -> tuple[Drive, list[str]]:
     """One bag as a drive, and what there is to say of it."""
-    commands, pictures = None, None
+    commands, wheels, pictures = None, None, None
     said: list[str] = []
     with open_bag(path) as bag:
         if choice.commands is not None:
@@ -234,7 +246,10 @@ def _read_drive(name: str, path: Path, choice: Choice, wanted: Wanted) -> tuple[
         else:
             poses, notes = read_poses(bag, choice.poses.name, wanted.stamps)
         said += notes
+        if choice.wheels is not None:
+            wheels, notes = read_wheels(bag, choice.wheels.name, wanted.stamps)
+            said += notes
         if choice.pictures is not None:
             pictures, notes = read_pictures(bag, choice.pictures.name, wanted.stamps)
             said += notes
-    return Drive(name, commands, poses, pictures), said
+    return Drive(name, commands, poses, pictures, wheels), said

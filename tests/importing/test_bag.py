@@ -10,7 +10,16 @@ from one_line import complaint_of
 
 from proxytune.errors import LogError
 from proxytune.importing import Wanted, bag as bag_module
-from proxytune.importing.bag import Stamps, bags_in, choose_times, open_bag, read_commands, read_poses, seconds
+from proxytune.importing.bag import (
+    Stamps,
+    bags_in,
+    choose_times,
+    open_bag,
+    read_commands,
+    read_poses,
+    read_wheels,
+    seconds,
+)
 from proxytune.importing.topics import read_bag
 
 TIMES = 1.7e9 + np.arange(30) * 0.1
@@ -209,6 +218,46 @@ def test_a_message_that_cannot_be_used_is_told_by_number(tmp_path, kind, fields,
         told = complaint_of(*read, "header")
     assert "run.bag: /topic" in told
     assert said in told
+
+
+FOUR = ("front_left_wheel", "rear_left_wheel", "front_right_wheel", "rear_right_wheel", "left_gripper")
+
+
+def turning(number):
+    """A robot whose left wheels turn at 1 and 2 rad/s, its right ones at 4 and 6, every second message of an arm."""
+    if number % 2:
+        return with_header(name=["elbow"], position=[1.0], velocity=[9.0])(number)
+    return with_header(name=FOUR, velocity=[1.0, 2.0, 4.0, 6.0, 50.0])(number)
+
+
+def turned(number):
+    """Angles of wheels at 1 and −20 rad/s, the right one within a turn, beside velocities that are none."""
+    angles = [0.1 * number, np.angle(np.exp(-2j * number))]
+    return with_header(name=["wheel_left", "wheel_right"], position=angles, velocity=[0.0, 0.0])(number)
+
+
+@pytest.mark.parametrize("storage", ["ros1", "mcap"])
+def test_wheels_turn_as_joints_say_by_velocity_on_average_or_by_angle_and_other_joints_are_passed_over(
+    tmp_path, storage
+):
+    with written(tmp_path, JOINTS, turning, storage) as bag:
+        wheels, notes = read_wheels(bag, "/topic", "header")
+    assert wheels.speeds == pytest.approx(np.tile((1.5, 5.0), (3, 1)))
+    assert wheels.times == pytest.approx(SENT[::2] - 0.01, abs=1e-6)
+    assert notes == ()
+    (tmp_path / "again").mkdir()
+    with written(tmp_path / "again", JOINTS, turned, storage) as bag:
+        wheels, notes = read_wheels(bag, "/topic", "header")
+    assert wheels.speeds == pytest.approx(np.tile((1.0, -20.0), (5, 1)), rel=1e-4)
+    assert notes == ("/topic measures no velocities: they are how fast its angles change.",)
+
+
+@pytest.mark.parametrize("fields", [joints("a", "b", "c"), with_header(name=["left", "right"])])
+def test_joints_that_measure_no_wheels_are_told_by_their_names(tmp_path, fields):
+    with written(tmp_path, JOINTS, fields) as bag:
+        told = complaint_of(read_wheels, bag, "/topic", "header")
+    assert "run.bag: /topic: needs two messages or more with velocities or angles of a left and a right wheel" in told
+    assert "but has joints a, b, c" in told or "but has joints left, right" in told
 
 
 START_NS = 1_700_000_000 * 10**9

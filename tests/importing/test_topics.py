@@ -81,6 +81,18 @@ def test_a_depth_picture_joints_and_topics_of_other_kinds_are_not_taken():
         chosen(*rows)
 
 
+def test_measured_wheels_are_a_topic_that_is_named_and_the_listing_says_how():
+    rows = (*DRIVE, ("/joint_states", "Joints", 5))
+    assert chosen(*rows).wheels is None
+    roles = {channel.name: channel.role for channel in channels_of(topics(*rows), chosen(*rows))}
+    assert roles["/joint_states"] == "left out: taken only where it is named (--commands or --wheel-speeds)"
+    choice = chosen(*rows, wheels="joint_states")
+    assert choice.wheels.name == "/joint_states"
+    assert "Wheel speeds are 5 messages of /joint_states (JointState)." in notes_of(topics(*rows), choice)
+    with pytest.raises(LogError, match="topic /odom cannot be wheel speeds: nav_msgs/msg/Odometry is none of JointSt"):
+        chosen(*rows, wheels="/odom")
+
+
 @pytest.mark.parametrize("name", ["/c", "c"])
 def test_a_topic_that_is_named_is_taken(name):
     rows = (*DRIVE, ("/c", "Twist", 1), ("/p", "Pose", 1))
@@ -130,7 +142,7 @@ def test_every_topic_has_a_role_and_those_without_a_definition_or_lacking_in_a_b
         "poses",
         "left out: could be commands as well (--commands)",
         "left out: neither commands, poses nor pictures",
-        "left out: taken only where it is named (--commands)",
+        "left out: taken only where it is named (--commands or --wheel-speeds)",
         "left out: it has no messages",
     ]
     assert notes_of(rows, choice) == (

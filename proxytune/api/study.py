@@ -204,6 +204,7 @@ def read_study(path: str | Path) -> StudyReport:
     """
     settings = study.read_study_settings(Path(path))
     settings.check_single()
+    settings.check_theta()
     with Store.read(settings.home) as store:
         return StudyReport(study.result_of(study.open_read_only(settings, store)), study.Spent())
 

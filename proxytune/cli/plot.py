@@ -30,7 +30,10 @@ def run(arguments: argparse.Namespace) -> Answer:
         run = study.open_read_only(settings, store)
         curves = all_curves(run.of(study.with_metrics(run.study, metrics)) if metrics else run)
         result = None
-        if not curves or store.trials(run.study.objective.name):  # Sweeps alone make no study
+        if not curves:
+            settings.check_theta()
+        searched = settings.objective != study.LEARNING and store.trials(run.study.objective.name)
+        if searched or not curves:  # Sweeps alone make no study
             result = study.rescored(run, metrics) if metrics else study.result_of(run)
     names = [re.sub(r"[^\w.-]+", "_", str(metric).replace("%", "percent")) for metric in metrics]
     folder = settings.home / RESCORED / "+".join(names) if names else settings.home

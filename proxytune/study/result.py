@@ -24,7 +24,6 @@ from proxytune.study.opening import Study, read_target
 from proxytune.study.preflight import Preflight, noise_of, preflight_of
 from proxytune.study.pruning import rescored_pruned, spared
 from proxytune.study.run import knowledge_of, record, stopped
-from proxytune.study.settings import LEARNING, WITHOUT_THETA
 from proxytune.study.study_run import StudyRun, failure_of, score_trials
 from proxytune.usefulness import Assessment, Estimate, Expectation, NoiseFloor, assess
 
@@ -142,9 +141,6 @@ def result_of(run: StudyRun, scored_anew: Sequence[TrialRecord] | None = None) -
     trials = tuple(run.finished_trials() if scored_anew is None else scored_anew)
     earlier = earlier_trials(run)
     if not any(trial.state == "finished" for trial in trials) and (run.settings.budget or not earlier):
-        if not trials and run.settings.objective == LEARNING:
-            remedy = "where a θ is needed, give it itself, as in a model.toml"
-            raise RunError(f"{run.store.path}: is of a {WITHOUT_THETA}; {remedy}")
         reason = f"all trials failed, the first because {trials[0].failure}" if trials else "no trial is finished yet"
         raise RunError(f"{run.store.path}: {reason}")
     study, space = run.study, run.settings.space

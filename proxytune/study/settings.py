@@ -229,6 +229,12 @@ class StudySettings:
             one = self.home / FAMILIES / next(iter(self.families))
             raise self.error(FAMILIES, f"each of these is a study of its own, and one is needed; give one, as {one}")
 
+    def check_theta(self) -> None:
+        """Refuse a study without a best θ, also where it has trials that narrowed its box by PRPV."""
+        if self.objective == LEARNING:
+            remedy = "where a θ is needed, give it itself, as in a model.toml"
+            raise InputError(f"{self.home}: is a {WITHOUT_THETA}; {remedy}")
+
 
 def read_study_settings(path: Path) -> StudySettings:
     """Read a study.toml, given as the file or as its folder; of a folder families/NAME, as that family has it.

@@ -90,6 +90,14 @@ def test_a_parameter_without_effect_is_a_warning_at_the_line_that_runs_the_study
         run_study(folder)
 
 
+def test_of_a_study_of_plv_it_says_where_the_answer_is_also_where_prpv_narrowed_its_box(make_study):
+    folder = make_study()
+    run_study(folder, budget=5)
+    make_study(objective='"plv"')
+    problem = "is a study of 'plv', which tells its best teacher in report.html and no best θ; where a θ is needed"
+    assert complaint_of(read_study, folder).startswith(f"{folder}: {problem}")
+
+
 def test_progress_is_shown_only_when_asked_for(make_study, monkeypatch):
     bars = Mock(side_effect=lambda total, unit: nullcontext(Silent()))
     monkeypatch.setattr("proxytune.running.progress.Bars", bars)

@@ -59,7 +59,7 @@ def test_a_study_of_learning_value_tells_its_best_proxy(make_study, answered):
 
 
 @pytest.mark.slow
-def test_prpv_narrows_the_box_first_where_that_is_asked_for(make_study, answered):
+def test_prpv_narrows_the_box_first_where_that_is_asked_for_and_has_no_best_theta(make_study, answered, refused):
     more = "budget = 2\nnarrow = true"
     folder = make_taught(make_study, objective='"plv"', parameters={"trim": "[-0.3, 0.3]"}, more=more)
     document = answered("study", folder)
@@ -67,7 +67,12 @@ def test_prpv_narrows_the_box_first_where_that_is_asked_for(make_study, answered
     assert document["narrowed_by_prpv"] is True
     assert -0.3 <= low < high <= 0.3
     assert all(low <= trial["theta"]["trim"] <= high for trial in document["trials"])
-    assert (folder / "study.db").exists()
+    page = (folder / "report.html").read_text()
+    for words in (("export", folder, "--to", "skopt", "--output", folder / "trials.pkl"), ("plot", folder)):
+        assert "tells its best teacher in report.html and no best θ" in refused(*words)
+    answered("sweep", folder, "--parameter", "trim", "--points", "2", "--at", "nominal")
+    assert "best" not in answered("plot", folder)
+    assert (folder / "report.html").read_text() == page
 
 
 @pytest.mark.parametrize(

@@ -356,13 +356,6 @@ def test_an_open_trial_does_not_count(finished):
     assert len(looked_at(open_study(finished)).trials) == 7
 
 
-def test_of_a_study_of_plv_it_says_where_the_answer_is(make_study):
-    folder = make_study(objective='"plv"')
-    problem = "study.db: is of a study of 'plv', which tells its best teacher in report.html and no best θ; where a θ"
-    with Store.open(folder) as store, pytest.raises(RunError, match=problem):
-        result_of(StudyRun(open_study(folder), store))
-
-
 def test_without_a_scored_trial_it_says_so(make_study):
     folder = make_study()
     with Store.open(folder) as store:

@@ -1,6 +1,7 @@
 from .curve_model import POSTERIOR_DRAWS as POSTERIOR_DRAWS, LearningCurve as LearningCurve, doublings as doublings
 from .learner import Learner as Learner, Weights as Weights, policy_of as policy_of
 from .lessons import (
+    NOT_KEPT as NOT_KEPT,
     Arrays as Arrays,
     Cache as Cache,
     Costs as Costs,

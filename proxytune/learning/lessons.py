@@ -125,6 +125,8 @@ def describe_distribution(where: Distribution) -> str:
 Arrays = Mapping[str, NDArray[Any]]
 FACTS = "facts"
 """The array in each file that says, as JSON, what determines the others."""
+NOT_KEPT = (FACTS, "file", "allow_pickle")
+"""Names that arrays cannot be kept under: ours, and those of savez's own arguments."""
 
 
 @dataclass(frozen=True)

@@ -200,11 +200,13 @@ class Stage:
         start = self.weights(0)
         with watching("the learner's training"):
             weights: Any = self.setup.learner.train(samples, start, self.seed)
+            learner = self.setup.settings.learner
             if not isinstance(weights, Mapping) or not all(
                 isinstance(name, str) and not np.asarray(array).dtype.hasobject for name, array in weights.items()
             ):
-                learner = self.setup.settings.learner
                 raise LearnerError(f"train of '{learner}' returned no arrays of numbers by name; return a dict of such")
+            if taken := next((name for name in learning.NOT_KEPT if name in weights), ""):
+                raise LearnerError(f"train of '{learner}' calls an array '{taken}', which is taken; call it otherwise")
             return weights
 
 

@@ -327,6 +327,13 @@ def test_weights_that_are_no_arrays_by_name_are_refused_by_the_learners_name(tmp
     assert not list(tmp_path.glob("weights-*"))
 
 
+@pytest.mark.parametrize("name", ["file", "allow_pickle", "facts"])
+def test_weights_under_a_name_that_they_cannot_be_kept_by_are_refused_by_that_name(tmp_path, name):
+    one = setup(tmp_path, learner=Odd(weights={"matrix": np.zeros((3, 2)), name: np.zeros(2)}))
+    told = f"none: train of '{one.settings.learner}' calls an array '{name}', which is taken; call it otherwise"
+    assert complaint_of(one.score, ALONE) == told
+
+
 class Silly(Schoolroom):
     """Its scores are none."""
 

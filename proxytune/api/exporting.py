@@ -18,7 +18,7 @@ from proxytune.files import check_place, write_whole
 from proxytune.search import History, write_optuna, write_skopt
 from proxytune.settings import figure_cautions, nearest
 from proxytune.space import Theta
-from proxytune.study import FILE_NAME, bare_family, read_study_settings
+from proxytune.study import FILE_NAME, bare_family, read_study_settings, study_around
 
 TRIALS: Mapping[str, Callable[[History, Path], None]] = {"optuna": write_optuna, "skopt": write_skopt}
 """Formats that take the trials of a study, not what was found."""
@@ -101,7 +101,9 @@ def export(
         raise InputError("--has: is for --to filter; leave it out")
     if wheels and into is None:
         raise InputError("--wheels: is for --into FILE; leave it out")
-    check_place(file, inputs=filter(None, (path, into, *path.glob("*.csv"))))
+    settings = read_study_settings(path) if (path / FILE_NAME).is_file() or study_around(path) else None
+    elsewhere = (settings.folder, *settings.targets) if settings else ()
+    check_place(file, inputs=filter(None, (path, into, *path.glob("*.csv"), *elsewhere)))
     if to in TRIALS:
         return _export_trials(path, file, to)
     if to and to not in (report.FILTER, *WRITERS):

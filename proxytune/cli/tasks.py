@@ -17,7 +17,7 @@ from proxytune.errors import InputError
 from proxytune.files import check_place
 from proxytune.importing import Survey
 from proxytune.settings import read_settings
-from proxytune.study import FILE_NAME, read_study_settings
+from proxytune.study import read_study_settings
 
 MOST_FRAMES = 1_000_000
 """As many as six digits number."""
@@ -65,8 +65,8 @@ def fleet(arguments: argparse.Namespace) -> Answer:
 
 def measure(arguments: argparse.Namespace) -> Answer:
     """`measure`: score a study's agents from every start in the domain of a model file, and write the table."""
-    folder = arguments.path.parent if arguments.path.name == FILE_NAME else arguments.path
-    check_place(arguments.output, inputs=(folder, *_files_of(arguments.model, folder)))
+    settings = read_study_settings(arguments.path)
+    check_place(arguments.output, inputs=(settings.folder, settings.home, *_files_of(arguments.model, settings.folder)))
     found = api.measure(arguments.path, arguments.model, repeats=arguments.repeats, seed=arguments.seed, progress=True)
     found.write(arguments.output)
     document = {"scores": str(arguments.output), **found.document()}

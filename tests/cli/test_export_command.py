@@ -2,6 +2,7 @@
 
 import pytest
 import skopt
+from several import make_several
 
 from proxytune.api import read_study
 from proxytune.cli.main import main
@@ -100,6 +101,14 @@ def test_trials_are_what_scikit_optimize_loads_and_other_simulators_refused(
     found, report = skopt.load(tmp_path / "trials.pkl"), read_study(finished)
     assert dict(zip(("delay", "trim"), found.x, strict=True)) == report.theta
     assert found.func_vals.tolist() == report.trials().score.tolist()
+
+
+def test_the_study_around_a_family_and_a_target_elsewhere_are_kept(make_study, tmp_path, refused):
+    folder = make_several(make_study, target='"../real.csv"')
+    (tmp_path / "real.csv").write_text((folder / "target.csv").read_text())
+    for kept in (folder / "study.toml", folder / "right.toml", tmp_path / "real.csv"):
+        told = refused("export", folder / "families" / "right", "--to", "ros", "--output", kept)
+        assert f"{kept.name}: is read by this command, and would be lost" in told
 
 
 def test_a_robot_without_a_folder_has_ros_parameters_but_no_body(tmp_path, answered, refused):

@@ -1,6 +1,7 @@
 import shutil
 
 import pytest
+from several import make_several
 
 from proxytune.cli.main import main
 from proxytune.files import shipped
@@ -56,6 +57,13 @@ def test_the_study_and_the_robot_of_the_model_are_kept_and_an_earlier_target_is_
             assert f"{kept.name}: is read by this command, and would be lost" in told
     model.write_text("trim = 0.1\n")
     answered("measure", folder, "--model", model, "--output", folder / "target.csv")
+
+
+def test_the_files_of_the_study_around_a_family_are_kept(make_study, refused):
+    folder = make_several(make_study)
+    for kept in ("study.toml", "right.toml"):
+        words = ("--model", folder / "wrong.toml", "--output", folder / kept)
+        assert f"{kept}: is read by this command" in refused("measure", folder / "families" / "right", *words)
 
 
 def test_repeats_are_labelled_and_one_gives_the_table_of_none_asked_for(measured, words, answered, tmp_path):

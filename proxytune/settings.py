@@ -11,7 +11,7 @@ import tomllib
 import unicodedata
 from collections.abc import ItemsView, Iterable, Iterator, KeysView, Mapping
 from dataclasses import dataclass
-from numbers import Integral
+from numbers import Integral, Real
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -323,6 +323,13 @@ def check_whole(name: str, given: object, low: int = 0) -> None:
         raise InputError(f"{name} must be a whole number, got {given!r}")
     if given < low:
         raise InputError(f"{name} must be at least {low}, got {given}")
+
+
+def check_numbers(theta: Mapping[Any, object], where: str = "θ") -> None:
+    """Refuse a θ with a value that is no number, by an InputError."""
+    for name, given in theta.items():
+        if isinstance(given, bool) or not isinstance(given, Real):
+            raise InputError(f"{where}: {name} must be a number, got {given!r}")
 
 
 def is_finite(value: float) -> bool:

@@ -21,7 +21,7 @@ from proxytune.arrays import Floats
 from proxytune.domain import DomainFamily, Episode
 from proxytune.errors import InputError, SettingsError
 from proxytune.identity import digest
-from proxytune.settings import nearest
+from proxytune.settings import check_numbers, nearest
 from proxytune.space import Interval, Parameter, Theta
 from proxytune.storage import Store, SweepRecord, is_begun
 from proxytune.study import (
@@ -201,6 +201,7 @@ def sweep_interval(study: Study, parameter: str) -> Interval:
 
 def check_base(study: Study, base: Theta) -> None:
     """Refuse values that the family cannot take."""
+    check_numbers(base)
     for name, value in base.items():
         known = _parameter(study, name)
         if not known.low <= value <= known.high:

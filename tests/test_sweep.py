@@ -228,7 +228,12 @@ def test_a_parameter_is_swept_over_the_study_s_box_or_else_over_all_it_may_be(ma
 
 @pytest.mark.parametrize(
     ("base", "expected"),
-    [({"trimm": 0.1}, "did you mean 'trim'"), ({"trim": 0.5}, "must lie within"), ({"trim": float("nan")}, "got nan")],
+    [
+        ({"trimm": 0.1}, "did you mean 'trim'"),
+        ({"trim": 0.5}, "must lie within"),
+        ({"trim": float("nan")}, "got nan"),
+        ({"trim": "0"}, "number"),
+    ],
 )
 def test_a_base_that_the_family_cannot_take_is_refused(make_study, base, expected):
     assert expected in complaint_of(sweep.check_base, open_study(make_study()), base)

@@ -16,7 +16,7 @@ from proxytune.effects import Catalogue, FilterContext, effect_of
 from proxytune.errors import InputError
 from proxytune.files import check_place, write_whole
 from proxytune.search import History, write_optuna, write_skopt
-from proxytune.settings import figure_cautions, nearest
+from proxytune.settings import check_numbers, figure_cautions, nearest
 from proxytune.space import Theta
 from proxytune.study import FILE_NAME, bare_family, read_study_settings, study_around
 
@@ -229,6 +229,7 @@ class CommandFilter:
         if isinstance(model, Mapping):
             if figures is None:
                 raise InputError("figures: must be given where the model is values; take them from robot.toml")
+            check_numbers(model)
             drive = "ackermann" if "wheelbase" in figures else "differential"
             robot = driving.Robot("given", "", dict(figures), {}, None, Catalogue(Path.cwd(), drive=drive), reverse)
             instance = report.Instance(robot, dict(model), {}, "given")

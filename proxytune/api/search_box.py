@@ -7,7 +7,7 @@ import pandas as pd
 
 from proxytune.errors import InputError
 from proxytune.search import Engine, Trial, Values, make_proposer
-from proxytune.settings import check_whole
+from proxytune.settings import check_numbers, check_whole
 from proxytune.space import Interval, Space, Theta
 
 
@@ -102,6 +102,7 @@ class SearchBox:
         """Index of this θ among those asked for, the first that has no score."""
         if set(theta) != set(self._space.names):
             raise InputError(f"θ names {', '.join(theta)}; the box has {', '.join(self._space.names)}")
+        check_numbers(theta)
         values = self._space.values(theta)
         places = [place for place, asked in enumerate(self._asked) if asked == values]
         left = [place for place in places if place not in self._scores]

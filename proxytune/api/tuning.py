@@ -23,7 +23,7 @@ from proxytune.files import temporary_folder
 from proxytune.identity import digest, meaning_of_code
 from proxytune.report import write_text
 from proxytune.scores import Metric, ScoreTable, read_scores
-from proxytune.settings import nearest
+from proxytune.settings import check_numbers, nearest
 from proxytune.space import Parameter, Theta
 from proxytune.study import FILE_NAME, GIVEN, Study, open_settings, plan_episodes, read_study_settings
 
@@ -206,7 +206,8 @@ def _known(study: Study, known: pd.DataFrame | Iterable[Theta]) -> list[Outcome 
         if not isinstance(known, pd.DataFrame) and (others := [name for name in row if name not in space.names]):
             hint = nearest(str(others[0]), space.names)
             raise InputError(f"{where}: '{others[0]}' is no parameter of the box; {hint}")
-        theta = {one.name: float(row[one.name]) for one in space.intervals}
+        check_numbers({name: row[name] for name in space.names}, where)
+        theta = {name: float(row[name]) for name in space.names}
         for one in space.intervals:
             if not one.low <= theta[one.name] <= one.high:
                 raise InputError(f"{where}: {one.name} is {theta[one.name]:g}, outside [{one.low:g}, {one.high:g}]")

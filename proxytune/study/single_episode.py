@@ -12,7 +12,7 @@ from proxytune.domain import DomainFamily, Episode, Recording
 from proxytune.effects import is_learnt, parameter_hint
 from proxytune.errors import EpisodeError, InputError
 from proxytune.running import run_episode
-from proxytune.settings import read_settings
+from proxytune.settings import check_numbers, read_settings
 from proxytune.space import Theta
 from proxytune.study.study_run import failure_of
 
@@ -58,6 +58,7 @@ def check_episode(family: DomainFamily, agent: str, theta: Theta, start: int) ->
     family.check_agent(agent)
     if not 0 <= start < family.starts:
         raise InputError(f"start {start}: the family has {family.starts}; give 0 to {family.starts - 1}")
+    check_numbers(theta)
     # A model.toml checks its learnt curves where it is read; a family that is built of effects drives them.
     named = {name: value for name, value in theta.items() if not (is_learnt(name) and hasattr(family, "effects"))}
     for name, value in named.items():

@@ -116,6 +116,7 @@ def test_a_function_of_theta_and_agent_with_one_score_is_enough():
         ({"seed": None}, "tune: Unable to convert"),
         ({"enginee": "gp"}, "enginee: unknown key; did you mean 'engine'?"),
         ({"known": [{"gain": 9.0, "drag": 0.0}]}, "known: row 0: gain is 9, outside [0.5, 2]"),
+        ({"known": [{"gain": "much", "drag": 0.0}]}, "known: row 0: gain must be a number, got 'much'"),
         ({"known": [{"gian": 1.0, "gain": 1.0, "drag": 0.0}]}, "row 0: 'gian' is no parameter of the box; did you"),
         ({"known": [{"gain": 1.0}]}, "known: row 0: has no 'drag'; give each parameter of the box"),
         ({"known": rows(TRUE, 1, **TRUE).replace("a", "z")}, "known: row 0: is no episode of this study"),

@@ -243,6 +243,8 @@ def test_what_would_overwrite_or_misread_the_users_own_is_refused(model, tmp_pat
         assert "--wheels: is for --into FILE" in complaint_of(export, model, tmp_path / "o", to=to, wheels="ab")
     assert "--has: is for --to filter" in complaint_of(export, model, tmp_path / "o", into=model, has="trim")
     told = complaint_of(lambda: CommandFilter(model, rate_hz=HZ, has="trimm"))
+    told_too = complaint_of(lambda: CommandFilter({"trim": "0.1"}, rate_hz=HZ, figures={}))
+    assert told_too == "θ: trim must be a number, got '0.1'"
     assert told == "has=trimm: no such effect; did you mean 'trim'?"
     assert "two finite numbers" in complaint_of(CommandFilter(model, rate_hz=HZ).step, (np.nan, 0.0))
 

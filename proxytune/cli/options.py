@@ -65,7 +65,10 @@ def facts_of(arguments: argparse.Namespace) -> Facts:
     offset = arguments.clock_offset
     if offset not in ("", "fit") and finite(offset) is None:
         raise InputError(f"--clock-offset {offset}: give seconds, as in -0.25, or fit")
-    road = arguments.map
+    log, road = vars(arguments).get("log"), arguments.map
+    if (arguments.figure or road) and log and (log / "log.toml").is_file():
+        option = "--figure" if arguments.figure else "--map"
+        raise InputError(f"{option}: is for a bag or table, and {log} is a log already; state it in its log.toml")
     road = str(Path(road).resolve()) if road.endswith(".toml") else road
     return Facts(arguments.robot or "", read_geometry(arguments.figure), road, offset)
 

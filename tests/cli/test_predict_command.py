@@ -111,6 +111,11 @@ BAD = {
     "its log's settings": (["{model}", "{log}", "--output", "{log}/log.toml"], "is read by this command"),
     "its own frames": (["{model}", "{log}", "--frames", "--output", "{log}"], "is read by this command"),
     "a horizon of pictures": (["{model}", "{log}", "--frames", "--horizon", "2"], "--horizon: is for poses"),
+    "a figure for a log": (
+        ["{model}", "{log}", "--figure", "baseline_m=0.2"],
+        "log is a log already; state it in its log.toml",
+    ),
+    "a map for a log": (["{model}", "{log}", "--map", "small_loop"], "--map: is for a bag or table"),
     "a bag's option for a log": (["{model}", "{log}", "--clock-offset", "5"], "is a log already"),
     "a horizon shorter than a sample": (["{model}", "{log}", "--horizon", "0.01"], "shorter than a sample"),
 }

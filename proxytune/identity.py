@@ -12,6 +12,7 @@ import hashlib
 import inspect
 import json
 import os
+import re
 import textwrap
 import tomllib
 import warnings
@@ -25,6 +26,8 @@ LEFT_OUT = ("kind", "type_comment")
 """Fields of a syntax tree without a meaning: the u of u"…", and comments."""
 NOT_A_PACKAGE = ("study.toml", "pyvenv.cfg", "play_commands.py")
 """A folder with one of these is another study, an environment, or the drive that a diagnosis designed."""
+FILTER = re.compile(rb'#!/usr/bin/env python3\n"""Bend .* as proxytune found ')
+"""The head of a filter that `export` wrote: a ROS node, which a study next to it does not import."""
 
 
 def digest(*values: object, length: int = 16) -> str:
@@ -40,7 +43,7 @@ def meaning_of(paths: Iterable[Path], root: Path) -> str:
 
 
 def files_beside(folder: Path) -> list[Path]:
-    """The files of a folder and of those within it that can be packages, hidden ones left out, in order."""
+    """The files of a folder and of those within it that can be packages, hidden ones and filters left out, in order."""
     found, known = [], set[str]()
     for here, folders, names in os.walk(folder, followlinks=True):
         known.add(os.path.realpath(here))
@@ -49,7 +52,7 @@ def files_beside(folder: Path) -> list[Path]:
         named = [name for name in within if name.isidentifier() and name != "__pycache__"]
         folders[:] = [name for name in named if not any(Path(here, name, one).exists() for one in NOT_A_PACKAGE)]
         found += [Path(here, name) for name in names if not name.startswith(".")]
-    return sorted(found)
+    return sorted(path for path in found if not (is_module(path) and FILTER.match(path.read_bytes())))
 
 
 def modules_beside(folder: Path) -> list[Path]:

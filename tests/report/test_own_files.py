@@ -18,6 +18,7 @@ from proxytune.cli.main import main
 from proxytune.driving import drivetrain, link_pose, parse_urdf, read_robot, robot_home, rotation
 from proxytune.driving.plants import PlanarPlant
 from proxytune.effects import FilterContext, Model, effects_from, model_text
+from proxytune.identity import modules_beside
 from proxytune.report.export.instance import IN_WHEELS
 from proxytune.report.export.into import patch
 from proxytune.report.export.urdf import angles_of
@@ -260,6 +261,14 @@ def test_the_files_of_the_robot_are_kept_and_an_earlier_export_beside_them_is_re
         assert f"{kept.name}: is read by this command, and would be lost" in told
     for _ in range(2):
         assert "<robot" in export(model, tmp_path / "duckiebot" / "found.urdf", to="urdf").output.read_text()
+
+
+def test_a_filter_in_a_studys_folder_is_none_of_its_modules(model, tmp_path, write_file):
+    before = modules_beside(tmp_path)
+    export(model, tmp_path / "bend.py", to="filter")
+    car = write_file(model_text(Model("car", None, {"delay": 0.05}, {})), "car.toml")
+    export(car, tmp_path / "bend_car.py", to="filter")
+    assert modules_beside(tmp_path) == before
 
 
 @pytest.mark.parametrize("stamped", [False, True])

@@ -27,12 +27,13 @@ class Parser(argparse.ArgumentParser):
     """A parser that says what was probably meant by a command, an option or a choice that there is not."""
 
     def error(self, message: str) -> NoReturn:
-        """Complain in two lines, usage and problem, and end with 2."""
+        """Complain in one line, as of all bad input, and end with 2."""
         if choice := re.fullmatch(r"(.*)invalid choice: '(.*)' \(choose from (.*)\)", message):
             where, word, listed = choice.groups()
             known = [one.strip(" '") for one in listed.split(",")]
             message = f"{where}unknown '{word}'; {nearest(word, known)}"
-        super().error(message)
+        _complain(self.prog, f"{message} (see {self.prog} --help)")
+        self.exit(BAD_INPUT)
 
 
 def program() -> str:

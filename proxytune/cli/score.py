@@ -24,10 +24,10 @@ def read_sides(
     for name, theirs in columns.items():
         if theirs not in found:
             raise InputError(f"--columns {name}={theirs}: no table has a column '{theirs}'; {nearest(theirs, found)}")
-    for source in set(arguments.target) & set(arguments.proxy):
-        header = scores.column_names(*split_source(source))
-        if split_source(source)[1] is not None or "domain" not in header:
-            scores.check_sides(source, header, metrics)
+    if arguments.both is not None:  # A file that is named as both sides is compared with itself on purpose
+        header = scores.column_names(*split_source(arguments.both))
+        if split_source(arguments.both)[1] is not None or "domain" not in header:
+            scores.check_sides(arguments.both, header, metrics)
     parts = [split_source(source) for source in arguments.target]
     if len({domain for _, domain in parts}) > 1:
         several = "several files make one table; give all of them one domain, or none"
@@ -117,6 +117,11 @@ def run(arguments: argparse.Namespace) -> Answer:
     arguments.metric = _metrics_given(arguments)
     metrics = [scores.Metric.parse(text) for text in arguments.metric]
     (target_name, target), proxies = read_sides(arguments, [metric.name for metric in metrics])
+    same = [
+        f"{source} is given as the proxy and as the target: what is in it is compared with itself"
+        for source in arguments.proxy
+        if source in arguments.target and not arguments.both
+    ]
     left_out: Sequence[str] = ()
     if arguments.common:
         sides = {"the target": target, **{f"the proxy {name}": one for name, one in proxies.items()}}
@@ -147,12 +152,18 @@ def run(arguments: argparse.Namespace) -> Answer:
         document["table"] = str(arguments.table)
     if tested is not None:
         document["sequential"] = asdict(tested)
-    lines = [*left_out, *([f"sequential test: {report.sequential_sentence(tested)}"] if tested else ())]
+    lines = [
+        *(f"beware: {line}" for line in same),
+        *left_out,
+        *([f"sequential test: {report.sequential_sentence(tested)}"] if tested else ()),
+    ]
     shown = report.score_text(assessments, selection, lines, target=target_name)
     if selection is not None:
-        return Answer(document | report.ranking_document(assessments, selection), shown)
-    ((name, assessment),) = assessments.items()
-    return Answer({"proxy": name, **document, **report.score_document(assessment)}, shown)
+        document |= report.ranking_document(assessments, selection)
+    else:
+        ((name, assessment),) = assessments.items()
+        document = {"proxy": name, **document, **report.score_document(assessment)}
+    return Answer(document | {"cautions": [*same, *document["cautions"]]}, shown)
 
 
 def _test(assessments: Mapping[str, usefulness.Assessment], arguments: argparse.Namespace) -> usefulness.Sequential:

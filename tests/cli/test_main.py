@@ -95,15 +95,15 @@ def test_without_a_command_there_is_help_the_version_is_the_package_s_and_an_unk
         (["list", "efects"], "unknown 'efects'; did you mean 'effects'?"),
         (["plot", "one", "two", "three"], "unrecognized arguments: two three"),
         (["study"], "the following arguments are required: PATH"),
+        (["score", "--resamples", "many"], "argument --resamples: invalid int value: 'many'"),
     ],
 )
-def test_a_mistyped_word_is_answered_with_the_one_that_was_probably_meant(capsys, words, problem):
+def test_a_mistyped_word_is_answered_in_one_line_with_the_one_that_was_probably_meant(capsys, words, problem):
     with pytest.raises(SystemExit) as end:
         main(words)
     assert end.value.code == BAD_INPUT == 2
     told = capsys.readouterr().err
-    assert told.startswith("usage: python -m proxytune")
-    assert told.strip().endswith(problem)
+    assert re.fullmatch(rf"(python -m proxytune[ a-z]*): .*{re.escape(problem)} \(see \1 --help\)\n", told)
 
 
 FOREIGN = "code that is not proxytune's ended the command"

@@ -133,6 +133,12 @@ def test_weights_unpaired_episodes_and_the_seed_are_obeyed(tables):
     assert document(*base, "--seed", "1") == document(*base, "--seed", "1")
 
 
+def test_a_file_that_is_named_as_both_sides_is_a_perfect_proxy_and_told(tables):
+    found = document("--proxy", "real.csv", "--target", "real.csv", *METRIC)
+    assert (found["prpv"], found["ppv"], found["srcc"]["distance"]) == (0, 0.0, 1.0)
+    assert found["cautions"][0].startswith("real.csv is given as the proxy and as the target")
+
+
 @pytest.mark.slow
 def test_figures_are_drawn_where_asked(tables):
     found = document(*SIDES, *METRIC, "--output", "out")
@@ -157,7 +163,7 @@ def test_figures_are_drawn_where_asked(tables):
     ("words", "complaint"),
     [
         (("--proxy", "none.csv", "--target", "real.csv", *METRIC), "none.csv: no such file"),
-        (("--proxy", "real.csv", "--target", "real.csv", *METRIC), "'distance' would be both proxy and target"),
+        (("real.csv", *METRIC), "'distance' would be both proxy and target"),
         (("--proxy", "sim.csv", *METRIC), "--target is missing"),
         ((), "--proxy is missing"),
         (("sim.csv", "--proxy", "sim.csv", *METRIC), "give one table of both sides, or --proxy and --target"),

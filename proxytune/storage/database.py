@@ -67,6 +67,10 @@ def connect(path: Path, *, writable: bool) -> sqlite3.Connection:
         # Opening a pipe would wait for ever.
         what = "a folder" if path.is_dir() else "no file"
         raise StoreError(f"{path}: is {what}, so no study's database; move it away")
+    # A kill as it was made leaves it empty too, but then no page has been written.
+    if writable and path.exists() and not path.stat().st_size and path.with_name("report.html").exists():
+        problem = "is empty, and report.html beside it tells of a run"
+        raise StoreError(f"{path}: {problem}; restore a copy, or remove it to begin anew")
     with sqlite_errors_as_store_errors(path):
         undo_broken_write(path)
         connection = open_file(path, writable=writable)

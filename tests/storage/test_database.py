@@ -58,6 +58,16 @@ def test_it_can_be_read_while_it_is_written(tmp_path):
     database.disconnect(writer)
 
 
+def test_an_empty_file_beside_the_page_of_a_run_is_not_begun_anew(tmp_path):
+    (tmp_path / "study.db").touch()
+    (tmp_path / "report.html").touch()
+    with pytest.raises(StoreError, match="is empty, and report.html beside it tells of a run; restore a copy, or"):
+        database.connect(tmp_path / "study.db", writable=True)
+    assert (tmp_path / "study.db").stat().st_size == 0
+    (tmp_path / "study.db").unlink()
+    database.connect(tmp_path / "study.db", writable=True).close()
+
+
 def test_an_empty_file_left_by_a_kill_says_to_run_the_study_and_becomes_a_database(tmp_path):
     (tmp_path / "study.db").touch()
     with pytest.raises(StoreError, match="is empty; run the study first"):

@@ -158,7 +158,9 @@ def _as_objective(name: str, measure: Measure) -> Objective:
 def _of_users_measure(name: str, on_means: OfMeans, proxy: Floats, target: Floats, metrics: Sequence[Metric]) -> Floats:
     """A measure of mean scores that is not ours: what it does wrong is told in one line."""
     where = f" for means {proxy.shape} against {target.shape}"
-    values = ask(f"measure '{name}'", lambda: np.asarray(on_means(proxy, target, metrics), dtype=float), where)
+    # Copies, since PRPV and PPV are of the same means
+    own = proxy.copy(), target.copy()
+    values = ask(f"measure '{name}'", lambda: np.asarray(on_means(*own, metrics), dtype=float), where)
     if values.shape != proxy.shape[:-2]:
         told = f"measure '{name}' gives values {values.shape} of means {proxy.shape}"
         raise ExtensionError(f"{told}; give one for each table, {proxy.shape[:-2]}")

@@ -10,6 +10,7 @@ from searched import run
 from proxytune.api import drive
 from proxytune.errors import InputError
 from proxytune.report.study.page import usefulness_table
+from proxytune.scores import Metric, ScoreTable
 from proxytune.storage import Store
 from proxytune.study import PRPV, StudyRun, open_study, result_of, study_facts
 from proxytune.study.answer import run_confirmation
@@ -138,6 +139,18 @@ def test_what_a_measure_of_one_s_own_does_wrong_is_told_with_file_and_key_before
     )
     expected = f"study.toml: objective: measure 'mine:WRONG' {WRONG[formula]}"
     assert re.search(expected, complaint_of(open_study, folder))
+
+
+def test_a_measure_of_one_s_own_that_writes_into_the_means_leaves_prpv_and_ppv_as_they_are(own):
+    folders = own(), own(called="writes")
+    writes = "    proxy -= target\n    target -= target\n    return"
+    (folders[1] / "mine.py").write_text(OWN.replace("    return", writes))
+    values = []
+    for study in map(open_study, folders):
+        scores = {(agent, "0"): {"distance": place} for place, agent in enumerate(study.settings.agents)}
+        proxy, metrics = ScoreTable.from_episodes(scores), [Metric("distance")]
+        values.append(study.objective.measure(proxy=proxy, target=study.target, metrics=metrics))
+    assert values[0] == values[1]
 
 
 STUDY_OPENING_BAD = {

@@ -61,7 +61,8 @@ def learn(run: StudyRun) -> tuple[str, ...]:
     """Copy what earlier studies know into the store, unless it has been.
 
     Returns:
-        One line on each cheaper proxy that was copied: what its domain has otherwise.
+        One line on each cheaper proxy that was copied: what its domain has otherwise; and one on a design that known
+        trials take the place of.
 
     Raises:
         InputError: If one of them is not there, or is none of this domain, with its name.
@@ -75,6 +76,10 @@ def learn(run: StudyRun) -> tuple[str, ...]:
             for source in sources if key == LOW else ():
                 told = ", ".join(_otherwise(run, source)) or "its code or its robot is another"
                 notes.append(f"{LOW}: {source.path}: {told}")
+            if key == FULL and settings.budget:
+                count = len(earlier_trials(run))
+                spared = f"all {settings.initial}" if count >= settings.initial else f"{count} of {settings.initial}"
+                notes.append(f"initial: {spared} trials of the design are left out, as {FULL} knows {count}")
     return tuple(notes)
 
 

@@ -113,6 +113,15 @@ def test_a_study_with_knowledge_has_no_design(beside, make_study):
     assert known["best"]["region_share"] < alone["best"]["region_share"] + 1e-9
 
 
+@pytest.mark.parametrize(("initial", "spared"), [("5", "all 5"), ("12", "10 of 12")])
+def test_a_design_whose_place_is_taken_is_told_once(beside, make_study, initial, spared):
+    folder = make_study(**{**LEARNS, "budget": "2", "initial": initial})
+    with Store.open(folder) as store:
+        run = StudyRun(open_study(folder), store)
+        assert learn(run) == (f"initial: {spared} trials of the design are left out, as learn_from knows 10",)
+        assert learn(run) == ()
+
+
 @pytest.mark.slow
 def test_what_is_learnt_is_a_fact(beside, make_study):
     """A source that grows, or goes, changes nothing of a study that has learnt from it."""

@@ -61,6 +61,10 @@ def spread(values: Floats, places: Whole, length: int) -> Floats:
     return laid
 
 
+LONGEST_WAY = 4.0
+"""Of the way of half a second in the median: no way weighs more."""
+
+
 def check_headings(samples: Rows, command: str, rate_hz: float) -> None:
     """Refuse headings in degrees: they jump by 360, or fit the course over ground far better than as radians."""
     heading = samples.values["heading"]
@@ -77,7 +81,8 @@ def check_headings(samples: Rows, command: str, rate_hz: float) -> None:
 def _fits_as_degrees(samples: Rows, rate_hz: float, *, beyond: bool) -> bool:
     """True if course over ground and heading keep together with the heading in degrees only.
 
-    Angles are doubled, so that a robot may go backwards, and longer ways weigh more. Where headings go beyond a turn
+    Angles are doubled, so that a robot may go backwards, and longer ways weigh more, up to a limit: one may lead to a
+    place that is a slip. Where headings go beyond a turn
     of radians, a course that hardly varies is told by its direction too.
     """
     span = max(2, 2 * round(rate_hz / 4.0))
@@ -90,7 +95,9 @@ def _fits_as_degrees(samples: Rows, rate_hz: float, *, beyond: bool) -> bool:
     if moving.sum() < 20:
         return False
     way, middle = way[moving], middle[moving]
-    doubled = way**2 / np.abs(way) / np.abs(way).sum()
+    length = np.abs(way)
+    weights = np.minimum(length, LONGEST_WAY * np.median(length))
+    doubled = (way / length) ** 2 * weights / weights.sum()
     degrees, radians = (complex(np.sum(doubled * np.exp(-2j * h))) for h in (np.radians(middle), middle))
     scattered = abs(degrees) > 0.6 and abs(degrees) > abs(radians) + 0.3
     return scattered or (beyond and degrees.real > 0.8 and degrees.real > radians.real + 0.3)

@@ -317,6 +317,16 @@ def test_degrees_of_a_drive_that_hardly_turns_are_found_out(written, turn, start
     assert "look like degrees" in complaint(written(driven(turn=turn, start=start, degrees=True)))
 
 
+@pytest.mark.parametrize("off", [30.0, 1e4])
+def test_a_place_that_is_far_off_makes_no_degrees_of_radians(written, off):
+    table = pd.read_csv(io.StringIO(driven(turn=1.0, start=0.2)))
+    for row in range(60, 600, 60):
+        read_log(written(table.assign(x=table["x"].where(table.index != row, off)).to_csv(index=False)))
+    far = pd.read_csv(io.StringIO(driven(turn=1.0, start=0.2, degrees=True)))
+    far.loc[300, "x"] = off
+    assert "look like degrees" in complaint(written(far.to_csv(index=False)))
+
+
 def test_degrees_are_told_from_counted_turns_and_headings_askew(written):
     samples = BESIDE + "a,0,0,1,1,1,365\na,0.1,0,1,1,1,365.1\nb,0,0,1,1,1,5\nb,0.1,0,1,1,1,5.1\n"
     np.testing.assert_allclose(read_log(written(samples)).episodes[1].poses[:, 2], [5, 5.1])

@@ -82,8 +82,8 @@ def _fits_as_degrees(samples: Rows, rate_hz: float, *, beyond: bool) -> bool:
     """True if course over ground and heading keep together with the heading in degrees only.
 
     Angles are doubled, so that a robot may go backwards, and longer ways weigh more, up to a limit: one may lead to a
-    place that is a slip. Where headings go beyond a turn
-    of radians, a course that hardly varies is told by its direction too.
+    place that is a slip. Where headings go beyond a turn of radians, a course that hardly varies is told by its
+    direction too.
     """
     span = max(2, 2 * round(rate_hz / 4.0))
     x, y, heading = samples.columns(POSE).T

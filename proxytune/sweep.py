@@ -30,6 +30,7 @@ from proxytune.study import (
     Evaluation,
     Study,
     StudyRun,
+    check_model,
     describe,
     load_family,
     plan_episodes,
@@ -138,8 +139,7 @@ def _on_target(target: Replayable, episode: Episode) -> tuple[Any, Any]:
 
 def discrepancy_study(study: Study, model: Path) -> Study:
     """The study whose episodes are replays of its first agent's commands on the target that a model describes."""
-    if not model.is_file():
-        raise InputError(f"--target-model {model}: no such file; check the path")
+    check_model(study.settings, model, "--target-model")
     proxy: Any = study.family
     if not (hasattr(proxy, "drive") and hasattr(proxy, "replay")):
         lacks = f"family {study.settings.family} has no `drive` and `replay`, without which there is no POD"

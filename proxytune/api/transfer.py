@@ -22,7 +22,7 @@ from proxytune.running import watching
 from proxytune.scores import ScoreTable, write_scores
 from proxytune.seeds import target_seed
 from proxytune.settings import GEOMETRY, check_whole
-from proxytune.study import StudySettings, bare_family, cautions_of, measure_agents, read_study_settings
+from proxytune.study import StudySettings, bare_family, cautions_of, check_model, measure_agents, read_study_settings
 
 MOST_REPEATS = 1_000_000
 
@@ -178,8 +178,7 @@ def measure(
     check_whole("--seed", own)
     if not 1 <= repeats <= MOST_REPEATS:
         raise InputError(f"--repeats must be between 1 and {MOST_REPEATS}, got {repeats}")
-    if not path.is_file():
-        raise InputError(f"--model {path}: no such file; check the path")
+    check_model(settings, path, "--model")
     settings = replace(settings, agents=tuple(dict.fromkeys((*settings.agents, *settings.held_out))))
     episodes = len(settings.agents) * settings.starts * repeats
     family = bare_family(settings, path)

@@ -17,7 +17,7 @@ from proxytune.errors import InputError
 from proxytune.files import check_place
 from proxytune.importing import Survey
 from proxytune.settings import read_settings
-from proxytune.study import read_study_settings
+from proxytune.study import check_model, read_study_settings
 
 MOST_FRAMES = 1_000_000
 """As many as six digits number."""
@@ -95,8 +95,7 @@ def record(arguments: argparse.Namespace) -> Answer:
             limits = f"between {low} and {high}" if high < math.inf else f"at least {low}"
             raise InputError(f"--{name} must be {limits}, got {given}")
     settings = read_study_settings(arguments.path)
-    if not arguments.model.is_file():
-        raise InputError(f"--model {arguments.model}: no such file; check the path")
+    check_model(settings, arguments.model, "--model")
     check_place(arguments.output, folder=True)
     if (arguments.output / "log.toml").exists():
         raise InputError(f"{arguments.output}: holds a log; give another folder, or remove this one")

@@ -84,6 +84,7 @@ from .single_episode import (
     SideBySide as SideBySide,
     can_record as can_record,
     check_episode as check_episode,
+    check_model as check_model,
     check_robot as check_robot,
     drive_side_by_side as drive_side_by_side,
     record_episode as record_episode,

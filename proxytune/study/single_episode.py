@@ -14,6 +14,7 @@ from proxytune.errors import EpisodeError, InputError
 from proxytune.running import run_episode
 from proxytune.settings import check_numbers, read_settings
 from proxytune.space import Theta
+from proxytune.study.settings import StudySettings
 from proxytune.study.study_run import failure_of
 
 Columns = Mapping[str, NDArray[np.float64]]
@@ -162,10 +163,18 @@ def drive_side_by_side(
 
 def check_robot(family: DomainFamily, model: Path, option: str) -> None:
     """Refuse a model that is not there, or of another robot than the family's, by an InputError."""
+    _check_model(getattr(family, "robot", None), model, option)
+
+
+def check_model(settings: StudySettings, model: Path, option: str) -> None:
+    """Refuse a model that is not there, or of another robot than the study's [domain] states, by an InputError."""
+    ours = settings.family.startswith("proxytune.driving")  # What a key of theirs says others know
+    _check_model(settings.domain.get("robot") if ours else None, model, option)
+
+
+def _check_model(robot: str | None, model: Path, option: str) -> None:
     if not model.is_file():
         raise InputError(f"{option} {model}: no such file; check the path")
-    robot = getattr(family, "robot", None)
-    stated = read_settings(model).values.get("robot", robot)
-    if robot is not None and stated != robot:
+    if robot is not None and (stated := read_settings(model).values.get("robot", robot)) != robot:
         other = f"is of the robot '{stated}'; give a model of '{robot}', which the study drives"
         raise InputError(f"{option} {model}: {other}")

@@ -109,6 +109,20 @@ BAD = {
     "a best θ before any trial": (["--theta", "best"], "has no finished trial; run it first"),
     "no such model": (["--against", "no.toml"], "--against no.toml: no such file; check the path"),
 }
+WITH_MODELS = {
+    "measure": ("--model", "--output", "scores.csv"),
+    "record": ("--model", "--output", "log"),
+    "sweep": ("--target-model", "--parameter", "trim", "--points", "2", "--at", "nominal"),
+}
+
+
+@pytest.mark.parametrize("command", WITH_MODELS)
+def test_a_model_of_another_robot_is_named_by_its_file_and_option_not_study_toml(lane, refused, command):
+    option, *rest = WITH_MODELS[command]
+    told = f"proxytune {command}: {option} {OF_ANOTHER.format(lane=lane)}"
+    assert refused(command, lane, option, lane / "other.toml", *rest).startswith(told)
+
+
 OF_ANOTHER = "{lane}/other.toml: is of the robot 'irobot_create'; give a model of 'duckiebot'"
 BAD |= {option: ([option, "{lane}/other.toml"], f"{option} {OF_ANOTHER}") for option in ("--against", "--theta")}
 

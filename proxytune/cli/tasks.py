@@ -16,7 +16,7 @@ from proxytune.cli.terminal import Answer, waiting
 from proxytune.errors import InputError
 from proxytune.files import check_place
 from proxytune.importing import Survey
-from proxytune.settings import read_settings
+from proxytune.settings import nearest, read_settings
 from proxytune.study import check_model, read_study_settings
 
 MOST_FRAMES = 1_000_000
@@ -81,6 +81,19 @@ def _files_of(model: Path, folder: Path) -> tuple[Path, ...]:
     """A model, and what the robot that it names is read from."""
     named = str(read_settings(model).values.get("robot")) if model.is_file() else ""
     return (model, *api.robot_files(named, folder))
+
+
+def _check_effects(arguments: argparse.Namespace) -> None:
+    """Refuse own effects that neither the model nor its robot in the current folder names."""
+    if not arguments.effects or not arguments.model.is_file():
+        return
+    model = read_settings(arguments.model)
+    robot = Path(str(model.values.get("robot")), "robot.toml")
+    files = [model, *([read_settings(robot)] if robot.is_file() else [])]
+    named = {name for file in files for name in file.section("effects").values}
+    for name in names_in(arguments.effects):
+        if name not in named:
+            raise InputError(f"--effects {name}: {arguments.model} names no such effect; {nearest(name, named)}")
 
 
 def record(arguments: argparse.Namespace) -> Answer:
@@ -149,6 +162,7 @@ def predict(arguments: argparse.Namespace) -> Answer:
         raise InputError("--frames: needs a folder for the pictures; give it by --output DIR")
     if arguments.frames and arguments.horizon is not None:
         raise InputError("--horizon: is for poses, and --frames predicts pictures instead; leave one of the two out")
+    _check_effects(arguments)
     chosen: dict[str, Any] = {"wanted": wanted_of(arguments), "facts": facts_of(arguments)}
     horizon = chosen["horizon_s"] = 2.0 if arguments.horizon is None else arguments.horizon
     with waiting("predicting") as tell:
@@ -169,6 +183,7 @@ def predict(arguments: argparse.Namespace) -> Answer:
 def export(arguments: argparse.Namespace) -> Answer:
     """`export`: write what was found for other simulators or robots, and say what went where and what has no place."""
     check_place(arguments.output)
+    _check_effects(arguments)
     wheels, has = names_in(arguments.wheels), names_in(arguments.has)
     found = api.export(arguments.model, arguments.output, to=arguments.to, into=arguments.into, wheels=wheels, has=has)
     cautions = (f"beware: {line}" for line in found.facts.get("cautions", ()))

@@ -103,6 +103,11 @@ def test_trials_are_what_scikit_optimize_loads_and_other_simulators_refused(
     assert found.func_vals.tolist() == report.trials().score.tolist()
 
 
+def test_effects_of_ones_own_that_the_model_does_not_name_are_refused(model, tmp_path, refused):
+    line = refused("export", model, "--to", "ros", "--effects", "mine:Mine", "--output", tmp_path / "new")
+    assert line.endswith("--effects mine:Mine: " + f"{model} names no such effect; known are: dead_band, trim\n")
+
+
 def test_the_study_around_a_family_and_a_target_elsewhere_are_kept(make_study, tmp_path, refused):
     folder = make_several(make_study, target='"../real.csv"')
     (tmp_path / "real.csv").write_text((folder / "target.csv").read_text())

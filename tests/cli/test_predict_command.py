@@ -110,6 +110,7 @@ BAD = {
     "its own log": (["{model}", "{log}", "--output", "{log}/samples.csv"], "is read by this command"),
     "its log's settings": (["{model}", "{log}", "--output", "{log}/log.toml"], "is read by this command"),
     "its own frames": (["{model}", "{log}", "--frames", "--output", "{log}"], "is read by this command"),
+    "an effect that the model has not": (["{model}", "{log}", "--effects", "trimm"], "trimm: {model} names no such"),
     "a horizon of pictures": (["{model}", "{log}", "--frames", "--horizon", "2"], "--horizon: is for poses"),
     "a figure for a log": (
         ["{model}", "{log}", "--figure", "baseline_m=0.2"],
@@ -127,7 +128,7 @@ def test_bad_input_is_one_line_and_nothing_is_written(words, says, folder, model
     given = [word.format(home=tmp_path, log=folder, model=path) for word in words]
     line = refused("predict", *(given if "--output" in given else [*given, "--output", tmp_path / "p.csv"]))
     assert line.startswith("proxytune predict: ")
-    assert says in line
+    assert says.format(model=path) in line
     assert not (tmp_path / "p.csv").exists()
 
 

@@ -359,11 +359,11 @@ def test_the_command_shows_the_diff_and_how_to_make_the_filter_to_be_pasted_as_i
     monkeypatch.setenv("COLUMNS", "60")
     (tmp_path / "mine.urdf").write_text(URDF)
     given = ["export", str(model), "--into", str(tmp_path / "mine.urdf"), "--output", str(tmp_path / "found.urdf")]
-    assert main([*given, "--effects", "tyre:Grip, sag:Sag"]) == 0
+    assert main([*given, "--effects", "trim, dead_band"]) == 0
     told = capsys.readouterr().out
     assert """+  <link name="wheel_l"><collision><geometry><cylinder radius="0.02566""" in told
     then = next(line for line in told.splitlines() if "the filter for the rest: " in line)
     words = shlex.split(then.partition("rest: ")[2])
-    told = "--effects", "tyre:Grip, sag:Sag", "--to", "filter", "--has", "trim,wheel_gain,yaw_scrub", "--output"
+    told = "--effects", "trim, dead_band", "--to", "filter", "--has", "trim,wheel_gain,yaw_scrub", "--output"
     assert words == ["proxytune", "export", str(model), *told, "cmd_vel_filter.py"]
     assert "give either --to FORMAT" in refused(*given, "--to", "urdf")

@@ -130,16 +130,17 @@ def transaction(connection: sqlite3.Connection, path: Path) -> Iterator[sqlite3.
             yield connection
 
 
-def write_row(connection: sqlite3.Connection, table: str, row: Mapping[str, Any]) -> None:
+def write_row(connection: sqlite3.Connection, table: str, row: Mapping[str, Any]) -> bool:
     """Write a whole row in place of the one with its key, with its digest, and count it; in a transaction.
 
-    What the row has beside the table's columns is left out.
+    What the row has beside the table's columns is left out. Gives whether there was one with its key.
     """
     delete, insert = _writing(table, FORMAT)
     replaced = connection.execute(delete, row).rowcount
     connection.execute(insert, row)
     if not replaced:
         connection.execute("UPDATE counts SET rows = rows + 1 WHERE name = ?", (table,))
+    return bool(replaced)
 
 
 @cache

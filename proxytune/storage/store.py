@@ -168,7 +168,8 @@ class Store:
                     "seconds": outcome.seconds,
                     "code": None if works else code,
                 }
-                database.write_row(connection, "episodes", vars(episode) | row)
+                if database.write_row(connection, "episodes", vars(episode) | row):
+                    self._seconds = None  # They are of what is there now
         for outcome, theta in zip(outcomes, thetas, strict=True):
             episode = outcome.episode
             if (identity, theta) in self._outcomes:

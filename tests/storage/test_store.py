@@ -85,7 +85,9 @@ def test_what_has_been_read_is_kept_up_with_what_is_written(tmp_path):
         store.save_trial("identity", TrialRecord(1, THETA))
         assert store.outcomes("identity", THETA) == {EPISODE: again}
         assert store.trials() == [TrialRecord(1, THETA)]
-        assert store.seconds() == {("agent1", 2): 1.0}
+        assert store.seconds() == {("agent1", 2): 0.5}
+    with Store.read(tmp_path) as store:
+        assert store.seconds() == {("agent1", 2): 0.5}
 
 
 def test_facts_are_added_and_beginning_afresh_drops_trials_alone(tmp_path):

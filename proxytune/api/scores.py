@@ -48,10 +48,13 @@ def as_files(frames: Mapping[str, pd.DataFrame]) -> Iterator[Path]:
         try:
             yield folder
         except InputError as problem:
-            told = str(problem).replace(f"{folder}/", "")  # Lines of a file are rows of a DataFrame
-            told = re.sub(r"^(\w+)\.csv: line (\d+)", lambda found: f"{found[1]}: row {int(found[2]) - 2}", told)
-            told = re.sub(r"\b(\w+)\.csv\b", r"\1", told.replace(": row -1:", ":"))
-            raise type(problem)(told) from None
+            raise type(problem)(of_rows(str(problem).replace(f"{folder}/", ""))) from None
+
+
+def of_rows(told: str) -> str:
+    """A complaint about the lines of NAME.csv as one about the rows of the DataFrame NAME."""
+    told = re.sub(r"(\.csv: |but )line (\d+)", lambda found: f"{found[1]}row {int(found[2]) - 2}", told)
+    return re.sub(r"\b(\w+)\.csv\b", r"\1", told.replace(": row -1:", ":"))
 
 
 def column_table(title: str, frame: pd.DataFrame) -> pd.DataFrame:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from proxytune.api.scores import column_table, toml_text
+from proxytune.api.scores import column_table, of_rows, toml_text
 from proxytune.api.search_box import box_space
 from proxytune.api.study import StudyReport, run_quietly
 from proxytune.domain import Episode, Outcome
@@ -190,7 +190,9 @@ def _written(home: Path, scores: pd.DataFrame | str | Path) -> Iterator[Path]:
         for one, text in before.items():
             write_text(one, text)
         where = f"{home}: " if before else ""
-        raise type(problem)(str(problem).replace(str(table), "scores").replace(f"{path}: ", where)) from None
+        told = str(problem).replace(f"{path}: ", where)
+        told = of_rows(told.replace(str(table), "scores.csv")) if isinstance(scores, pd.DataFrame) else told
+        raise type(problem)(told) from None
 
 
 def _known(study: Study, known: pd.DataFrame | Iterable[Theta]) -> list[Outcome | Theta]:

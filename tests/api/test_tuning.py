@@ -31,7 +31,7 @@ def rows(theta, seed, **more):
 
 def tuned(simulator=simulate, **options):
     keys = {"metrics": ["distance:max", "time:min"], "budget": 4, "initial": 4, "preflight": False, "confirm": 0}
-    return proxytune.tune(simulator, BOX, rows(TRUE, 9), **keys | options)
+    return proxytune.tune(simulator, BOX, **{"scores": rows(TRUE, 9)} | keys | options)
 
 
 @pytest.mark.slow
@@ -113,6 +113,7 @@ def test_a_function_of_theta_and_agent_with_one_score_is_enough():
     ("options", "said"),
     [
         ({"metrics": "distanc:max"}, "scores: no column 'distanc'; did you mean 'distance'?"),
+        ({"scores": rows(TRUE, 1, **TRUE).replace("a", "")}, "scores: row 0, column 'agent': is empty; fill it in"),
         ({"seed": None}, "tune: Unable to convert"),
         ({"enginee": "gp"}, "enginee: unknown key; did you mean 'engine'?"),
         ({"known": [{"gain": 9.0, "drag": 0.0}]}, "known: row 0: gain is 9, outside [0.5, 2]"),

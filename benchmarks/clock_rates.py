@@ -133,4 +133,7 @@ def _said(found: Clocks) -> str:
 
 
 if __name__ == "__main__":
+    if "--help" in sys.argv:
+        print(__doc__)
+        sys.exit()
     main(int(sys.argv[1]) if len(sys.argv) > 1 else 40, [Path(word) for word in sys.argv[2:]])

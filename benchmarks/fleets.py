@@ -106,6 +106,9 @@ def main(checkouts: Sequence[str], sizes: Sequence[int] = SIZES, rounds: int = R
 
 
 if __name__ == "__main__":
+    if "--help" in sys.argv:
+        print(__doc__)
+        sys.exit()
     if sys.argv[1:2] == ["--measure"]:
         print(json.dumps(measure(sys.argv[2], int(sys.argv[3]), float(sys.argv[4]))))
     else:

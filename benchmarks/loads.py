@@ -100,4 +100,7 @@ def score_much(agents: int, episodes: int, proxies: int = 1, missing: int = 0) -
 
 
 if __name__ == "__main__":
+    if "--help" in sys.argv:
+        print(__doc__)
+        sys.exit()
     {"diagnose": diagnose_much, "score": score_much}[sys.argv[1]](*map(int, sys.argv[2:]))

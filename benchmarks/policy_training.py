@@ -61,6 +61,9 @@ def train(seed):
 
 
 if __name__ == "__main__":
+    if "--help" in sys.argv:
+        print(__doc__)
+        sys.exit()
     torch.set_num_threads(1)
     print("| seed | steps | return [m] | on the road [s] |\n|---|---|---|---|")
     for number in map(int, sys.argv[1:] or (0, 1, 2)):

@@ -31,7 +31,7 @@ def run(arguments: argparse.Namespace) -> Answer:
     own_seed = episode_seed(seed, arguments.start)
     episode = make_episode(theta, agent=arguments.agent, start=arguments.start, seed=own_seed)
     with waiting("driving"):
-        pair = study.drive_side_by_side(family, target, episode, filmed=arguments.output is not None)
+        pair = study.drive_side_by_side(episode, proxy=family, target=target, filmed=arguments.output is not None)
     compared = [metric.name for metric in settings.metrics]
     if arguments.output:
         write_episode(pair, compared, arguments.output)

@@ -131,7 +131,7 @@ def _drive(
     study = report.result.study
     episode = make_episode(report.theta, agent=agent, start=start, seed=episode_seed(study.settings.seed, start))
     try:
-        pair = drive_side_by_side(study.family, twin, episode, filmed=filmed)
+        pair = drive_side_by_side(episode, proxy=study.family, target=twin, filmed=filmed)
     except EpisodeError:
         return None
     return pair if all(side.has_places for side in pair.sides.values()) else None

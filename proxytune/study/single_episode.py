@@ -153,7 +153,7 @@ class SideBySide:
 
 
 def drive_side_by_side(
-    proxy: DomainFamily, target: DomainFamily | None, episode: Episode, *, filmed: bool = False
+    episode: Episode, *, proxy: DomainFamily, target: DomainFamily | None, filmed: bool = False
 ) -> SideBySide:
     """Run an episode in the proxy at its θ, and in the target as that is; an EpisodeError if either fails."""
     unit, road = getattr(proxy, "command_unit", ""), getattr(proxy, "road_to_draw", None)

@@ -35,7 +35,7 @@ def test_the_start_furthest_from_the_target_is_shown_and_nothing_without_a_twin_
     target = load_family(study.settings, closed.loop.twin)
     for start in range(4):
         episode = make_episode(THETA, agent="crawler", start=start, seed=episode_seed(study.settings.seed, start))
-        gaps.append(mean_gap_m(drive_side_by_side(study.family, target, episode)))
+        gaps.append(mean_gap_m(drive_side_by_side(episode, proxy=study.family, target=target)))
     before, after = drive_both(closed, "crawler").values()
     assert before.episode.start == after.episode.start == np.argmax(gaps)
     assert before.episode.seed == after.episode.seed

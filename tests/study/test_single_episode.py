@@ -1,5 +1,7 @@
 """One episode to look at, in proxy and target: the same but for what the domains differ in."""
 
+import inspect
+
 import numpy as np
 import pytest
 from episodes import paired, recorded
@@ -33,7 +35,12 @@ def side_by_side(folder, theta, tmp_path):
     proxy = load_family(settings, settings.proxy)
     (tmp_path / "model.toml").write_text(MODEL)
     target = load_family(settings, tmp_path / "model.toml")
-    return drive_side_by_side(proxy, target, make_episode(theta, agent="steady", start=1, seed=5))
+    return drive_side_by_side(make_episode(theta, agent="steady", start=1, seed=5), proxy=proxy, target=target)
+
+
+def test_proxy_and_target_are_named_where_both_drive():
+    taken = inspect.signature(drive_side_by_side).parameters
+    assert {taken[side].kind for side in ("proxy", "target")} == {inspect.Parameter.KEYWORD_ONLY}
 
 
 def test_a_proxy_starts_where_its_target_does_and_parts_from_one_unlike_it(lane, tmp_path):
@@ -80,6 +87,8 @@ def test_places_are_compared_at_the_same_time_until_one_has_ended():
 
 
 WATCHER = """
+import inspect
+
 import numpy as np
 
 class Watcher:

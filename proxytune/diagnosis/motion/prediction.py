@@ -241,7 +241,7 @@ def predict(log: Log, robot: Robot, theta: Theta, horizon_s: float) -> pd.DataFr
     reach = int(np.floor(min(horizon_s * log.rate_hz, longest) + 1e-9))
     starts = [_starts(episode, reach) for episode in log.episodes]
     if not any(len(rows) for rows in starts):
-        raise LogError(f"{log.name}: no measured pose to start a window from")
+        raise LogError(f"{log.name}: no measured pose to start a window from; add x, y and heading")
     ticks = round(whole.tick_hz / log.rate_hz)
     # Drives whose increments are the windows' beginnings alone.
     first = np.concatenate(starts) * ticks + whole.lead

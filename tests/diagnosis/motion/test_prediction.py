@@ -101,7 +101,7 @@ def test_a_log_needs_a_pose_windows_begin_at_measured_ones_and_others_are_not_co
     for row in starts.itertuples():
         np.testing.assert_allclose((row.x, row.y, row.heading), measured[row.episode, row.time], atol=1e-12)
     blind = with_poses(log, lambda poses: np.full_like(poses, np.nan))
-    with pytest.raises(LogError, match="no measured pose to start a window from"):
+    with pytest.raises(LogError, match="to start a window from; add x, y and heading"):
         predict(blind, ROBOT, TRUTH, 2.0)
     alone = with_poses(log, lambda poses: np.where(np.arange(len(poses))[:, None] > 0, np.nan, poses))
     told = predict(alone, ROBOT, TRUTH, 100.0)

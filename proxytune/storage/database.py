@@ -122,11 +122,13 @@ def make_tables(connection: sqlite3.Connection, version: int = FORMAT) -> None:
 
 @contextmanager
 def transaction(connection: sqlite3.Connection, path: Path) -> Iterator[sqlite3.Connection]:
-    """Have all that is written meanwhile be there at once, or nothing of it."""
+    """Have all that is written meanwhile be there at once, or nothing of it; one is over before the next begins."""
     with sqlite_errors_as_store_errors(path):
-        connection.execute("BEGIN IMMEDIATE")
+        # Ctrl-C may come between any two lines: before the one that ends a transaction too.
+        connection.rollback()
         # It commits, or rolls back where a full disk has not done so already.
         with connection:
+            connection.execute("BEGIN IMMEDIATE")
             yield connection
 
 

@@ -1,10 +1,13 @@
 import sqlite3
+import sys
 from dataclasses import replace
+from itertools import count
 
 import pytest
 
 from proxytune.domain import Outcome, make_episode
 from proxytune.errors import StoreError
+from proxytune.extensions import Interrupted
 from proxytune.storage import Store, SweepRecord, TrialRecord
 from proxytune.storage.store import theta_json
 
@@ -181,3 +184,41 @@ def test_the_last_episode_that_began_is_known_to_the_next_process_of_the_same_fa
         assert store.under_way("one") == RUNNING, "all that run at once"
         store.begin_episode("one")
         assert store.under_way("one") == []
+
+
+def interrupt_at(line):
+    """A tracer that raises Interrupted as this line, counted from the first it sees, is about to run."""
+    lines = count(1)
+
+    def trace(frame, event, argument):
+        if event == "line" and next(lines) == line:
+            sys.settrace(None)
+            raise Interrupted
+        return trace
+
+    return trace
+
+
+def test_an_interruption_at_any_line_of_a_write_leaves_a_store_that_writes_on(tmp_path):
+    """What was being written is there as a whole or not at all."""
+    kept, before = 0, sys.gettrace()
+    with Store.open(tmp_path) as store:
+        for line in count(1):
+            episode = replace(EPISODE, seed=line)
+            try:
+                sys.settrace(interrupt_at(line))
+                store.save_outcome("identity", Outcome(episode, {"distance": 0.5}, "", 1.5))
+            except Interrupted:
+                # As a command does that ends, while the interruption is on its way up.
+                store.begin_episode("identity")
+                store.save_fact("line", line)
+            else:
+                break
+            finally:
+                sys.settrace(before)
+            with sqlite3.connect(tmp_path / "study.db") as plain:
+                kept += plain.execute("SELECT count(*) FROM episodes WHERE seed = ?", (line,)).fetchone()[0]
+                assert plain.execute("SELECT value FROM facts").fetchall() == [(str(line),)]
+    assert 0 < kept < line - 1
+    with Store.read(tmp_path) as store:
+        assert len(store.outcomes("identity", THETA)) == kept + 1

@@ -23,7 +23,7 @@ from proxytune.importing.checks import check_units, checked_drive, lag_of
 from proxytune.importing.source import Drive, Facts, Pictures, Source, Survey, Wanted
 from proxytune.importing.tables import is_csv_tables, is_mrclam, is_tum, read_csv_tables, read_mrclam, read_tum
 from proxytune.importing.topics import read_bag
-from proxytune.logs import CAR_COMMANDS, COMMANDS, ENABLED, WHEELS, Log, read_log
+from proxytune.logs import COMMANDS, ENABLED, WHEELS, Log, read_log
 
 GAP_S = 0.5
 """A longer time without a pose is a gap."""
@@ -162,16 +162,12 @@ def fill_log(folder: Path, source: Source, facts: Facts, name: str, origin: str)
         if drive.commands is not None:
             names = ("time", *COMMANDS[drive.commands.kind], ENABLED)[: 1 + drive.commands.values.shape[1]]
             commands.append(_named(drive.name, (drive.commands.times, drive.commands.values), names))
-    # Where every command of a car was written down with a pose, both stand in one table.
+    # Where every command was written down with a pose, both stand in one table.
     if commands and all(
-        drive.commands is not None
-        and drive.commands.kind in CAR_COMMANDS
-        and np.array_equal(drive.commands.times, drive.poses.times)
+        drive.commands is not None and np.array_equal(drive.commands.times, drive.poses.times)
         for drive in source.drives
     ):
-        issued = (own.drop(columns=["episode", "time"]) for own in commands)
-        samples = [pd.concat(both, axis=1) for both in zip(samples, issued, strict=True)]
-        commands = []
+        samples, commands = [pd.merge(*both) for both in zip(commands, samples, strict=True)], []
     for name_of_file, tables in (("samples.csv", samples), ("commands.csv", commands)):
         if tables:
             pd.concat(tables).to_csv(folder / name_of_file, index=False, lineterminator="\n")

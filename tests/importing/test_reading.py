@@ -248,7 +248,7 @@ def test_a_log_that_is_there_is_not_written_over(tmp_path):
 
 def test_what_makes_no_log_or_breaks_off_leaves_nothing_behind(tmp_path):
     wild = replace(RUN, commands=replace(RUN.commands, kind="duty", values=np.full((len(STAMPS), 2), 7.0)))
-    with pytest.raises(LogError, match="log/commands.csv: line 2, column 'left': a duty must be between -1 and 1"):
+    with pytest.raises(LogError, match="log/samples.csv: line 2, column 'left': a duty must be between -1 and 1"):
         write_log(source(wild), tmp_path / "log", OWN, "bag")
     assert list(tmp_path.iterdir()) == []
 
@@ -268,11 +268,20 @@ def test_figures_are_read_by_the_names_of_log_toml_and_no_others():
         assert "--figure" in complaint_of(read_geometry, [text])
 
 
-def test_a_cars_commands_and_its_switch_stand_beside_the_poses(tmp_path, write_file):
+@pytest.mark.parametrize(
+    ("kind", "robot", "columns"),
+    [("ackermann", "car", "throttle,steering,enabled"), ("twist", "duckiebot", "v,omega,enabled")],
+)
+def test_commands_that_were_written_down_with_poses_and_a_switch_stay_beside_them(
+    tmp_path, write_file, kind, robot, columns
+):
     rows = "".join(f"{t / 20},{t / 50},0,0,0.3,{t % 3 - 1},1\n" for t in range(40))
-    source = read_source(write_file("time,x,y,heading,throttle,steering,enabled\n" + rows, "car.csv"), Wanted())
-    log = write_log(source, tmp_path / "log", Facts(robot="car"), "car.csv")
+    source = read_source(write_file(f"time,x,y,heading,{columns}\n{rows}", "run.csv"), Wanted())
+    log = write_log(source, tmp_path / "log", Facts(robot=robot), "run.csv")
     header = (tmp_path / "log" / "samples.csv").read_text().splitlines()[0]
-    assert header == "episode,time,x,y,heading,throttle,steering,enabled"
-    assert log.command == "ackermann"
+    assert header == f"episode,time,{columns},x,y,heading"
+    assert log.command == kind
     assert not (tmp_path / "log" / "commands.csv").exists()
+    (episode,) = log.episodes
+    np.testing.assert_array_equal(episode.issued, np.arange(40) / 20)
+    np.testing.assert_array_equal(episode.commands[:, 1], np.arange(40) % 3 - 1)

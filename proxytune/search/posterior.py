@@ -30,6 +30,8 @@ MOST_OF = 0.8
 """A box that keeps more than this of its volume is not worth another look."""
 TRADE = 0.6
 """Parameters that correlate by more in the posterior make up for each other."""
+EDGE = 0.01
+"""An interval that ends nearer to an end of the box reaches it: points there are too few to tell."""
 UNIDENTIFIED = 0.9
 """A parameter whose interval fills more of its range than this is not identified."""
 
@@ -87,15 +89,21 @@ class Posterior:
 
     @cached_property
     def intervals(self) -> Floats:
-        """The central 95 % of every parameter, shape (parameters, 2)."""
-        tails = ((1.0 - CREDIBLE_LEVEL) / 2.0, (1.0 + CREDIBLE_LEVEL) / 2.0)
+        """The shortest interval of every parameter that holds 95 %, shape (parameters, 2).
 
-        def quantiles(values: Floats) -> list[float]:
+        A central one leaves 2.5 % out at either end, so it never holds the end of a box, where a delay of 0 lies.
+        """
+
+        def shortest(values: Floats) -> tuple[float, float]:
             order = np.argsort(values, kind="stable")
-            reached = np.searchsorted(np.cumsum(self.weights[order]), tails)
-            return [float(values[order[min(row, len(values) - 1)]]) for row in reached]
+            values, reached = values[order], np.append(0.0, np.cumsum(self.weights[order]))
+            first = np.flatnonzero(reached + CREDIBLE_LEVEL <= reached[-1])
+            last = np.searchsorted(reached[1:], reached[first] + CREDIBLE_LEVEL)
+            best = int(np.argmin(values[last] - values[first]))
+            return values[first[best]], values[last[best]]
 
-        return np.array([quantiles(column) for column in self.points.T])
+        ends = np.array([shortest(column) for column in self.points.T])
+        return np.select([ends < EDGE, ends > 1.0 - EDGE], [0.0, 1.0], ends)
 
     @cached_property
     def unidentified(self) -> Floats:

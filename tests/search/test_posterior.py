@@ -147,6 +147,17 @@ def test_of_a_normal_in_the_box_share_and_intervals_are_those_of_the_normal(firs
     assert found.mode == pytest.approx([middle, 1.0 - middle], abs=0.02)
 
 
+@settings(max_examples=15)
+@given(st.floats(0.03, 0.2), st.sampled_from([0.0, 1.0]))
+def test_an_interval_holds_the_most_probable_value_also_at_an_end_of_the_box(width, end):
+    found = posterior_of(normal(np.array([end, 0.5]), np.array([width, 0.05])), 2)
+    low, high = sorted((end, abs(end - 1.96 * width)))
+    assert found.intervals[0] == pytest.approx([low, high], abs=0.1 * width)
+    assert end in found.intervals[0].tolist()
+    inside = (found.intervals[:, 0] <= found.mode) & (found.mode <= found.intervals[:, 1])
+    assert inside.all()
+
+
 def test_a_small_region_in_four_dimensions_is_measured_and_nothing_said_where_no_output_changes():
     widths = np.array([0.01, 0.03, 0.05, 0.02])
     found = posterior_of(normal(np.array([0.2, 0.5, 0.7, 0.4]), widths), 4)

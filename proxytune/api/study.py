@@ -79,8 +79,9 @@ class StudyReport(report.Shown):
         """Draw θ from what is known of it: a column per parameter, in its unit; how they trade off is in the rows.
 
         Each row is a θ that may have made the target, given every metric of every agent, drawn as often as it is
-        probable over the box. Run a simulator at some of them to see what is left open; of one column alone,
-        the shortest interval that holds 95 % is the one in the answer, but for the chance of the draws.
+        probable over the box. Run a simulator at some of them to see what is left open; of one column alone, the
+        central 95 % are the interval in the answer, but for the chance of the draws and ends of the box, which are
+        held there where they are as probable.
 
         Args:
             draws: How many rows.

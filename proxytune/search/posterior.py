@@ -31,7 +31,7 @@ MOST_OF = 0.8
 TRADE = 0.6
 """Parameters that correlate by more in the posterior make up for each other."""
 EDGE = 0.01
-"""An interval that ends nearer to an end of the box reaches it: points there are too few to tell."""
+"""An interval that ends nearer to an end of the box reaches it: points are no denser."""
 UNIDENTIFIED = 0.9
 """A parameter whose interval fills more of its range than this is not identified."""
 
@@ -89,21 +89,23 @@ class Posterior:
 
     @cached_property
     def intervals(self) -> Floats:
-        """The shortest interval of every parameter that holds 95 %, shape (parameters, 2).
+        """The central 95 % of every parameter, shape (parameters, 2), and an end of the box that is as probable.
 
-        A central one leaves 2.5 % out at either end, so it never holds the end of a box, where a delay of 0 lies.
+        Central ones leave 2.5 % out at either end, so they never hold an end of the box, where a delay of 0 lies. It
+        is held where the shortest interval with 95 % reaches it.
         """
 
-        def shortest(values: Floats) -> tuple[float, float]:
+        def ends(values: Floats) -> tuple[float, float]:
             order = np.argsort(values, kind="stable")
-            values, reached = values[order], np.append(0.0, np.cumsum(self.weights[order]))
-            first = np.flatnonzero(reached + CREDIBLE_LEVEL <= reached[-1])
-            last = np.searchsorted(reached[1:], reached[first] + CREDIBLE_LEVEL)
-            best = int(np.argmin(values[last] - values[first]))
-            return values[first[best]], values[last[best]]
+            values, below = values[order], np.append(0.0, np.cumsum(self.weights[order]))
+            firsts = np.flatnonzero(below + CREDIBLE_LEVEL <= below[-1])
+            lasts = np.searchsorted(below[1:], below[firsts] + CREDIBLE_LEVEL)
+            shortest = int(np.argmin(values[lasts] - values[firsts]))
+            low, high = values[np.searchsorted(below[1:], ((1.0 - CREDIBLE_LEVEL) / 2.0, (1.0 + CREDIBLE_LEVEL) / 2.0))]
+            at_low, at_high = values[firsts[shortest]] < EDGE, values[lasts[shortest]] > 1.0 - EDGE
+            return (0.0 if at_low else low, 1.0 if at_high else high)
 
-        ends = np.array([shortest(column) for column in self.points.T])
-        return np.select([ends < EDGE, ends > 1.0 - EDGE], [0.0, 1.0], ends)
+        return np.array([ends(column) for column in self.points.T])
 
     @cached_property
     def unidentified(self) -> Floats:

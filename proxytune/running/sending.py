@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cache, lru_cache
+from multiprocessing import resource_tracker
 from pathlib import Path
 from platform import node, python_version
 from typing import Any, TextIO, cast
@@ -98,6 +99,27 @@ def away_from_here() -> Iterator[tuple[int, str | None]]:
         _set_safe_path(before)
 
 
+OF_TERMINALS = (signal.SIGINT, signal.SIGHUP)
+"""Signals that reach every process of a terminal."""
+
+
+@contextmanager
+def unheard() -> Iterator[Callable[[], object]]:
+    """Have processes that start meanwhile not hear signals of a terminal, until `end_with` ignores them.
+
+    Python would answer Ctrl-C there with a traceback as long as it loads modules. This process hears of one afterwards:
+    call what is given, once they have started.
+    """
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, OF_TERMINALS)
+    try:
+        # loky starts it, and in some versions of Python that has SIGINT be heard again
+        resource_tracker.ensure_running()
+        signal.pthread_sigmask(signal.SIG_BLOCK, OF_TERMINALS)
+        yield lambda: signal.pthread_sigmask(signal.SIG_SETMASK, before)
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
 def _set_safe_path(value: str | None) -> None:
     os.environ.pop(SAFE_PATH, None)
     if value is not None:
@@ -113,8 +135,9 @@ def end_with(parent: int, safe_path: str | None) -> None:
     """
     _set_safe_path(safe_path)
     sys.stdout, sys.stderr = (cast(TextIO, LastingStream(one)) for one in (sys.stdout, sys.stderr))
-    for number in (signal.SIGINT, signal.SIGHUP):
+    for number in OF_TERMINALS:
         signal.signal(number, signal.SIG_IGN)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, OF_TERMINALS)  # as `unheard` left them
     if "PYTHONFAULTHANDLER" not in os.environ:
         faulthandler.disable()
 

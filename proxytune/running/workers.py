@@ -28,7 +28,16 @@ from joblib.externals.loky import ProcessPoolExecutor
 from joblib.parallel import BACKENDS, get_active_backend
 
 from proxytune.errors import RunError
-from proxytune.running.sending import NotSendableError, Recipe, away_from_here, do_sent, end_with, load_sent, recipe_of
+from proxytune.running.sending import (
+    NotSendableError,
+    Recipe,
+    away_from_here,
+    do_sent,
+    end_with,
+    load_sent,
+    recipe_of,
+    unheard,
+)
 
 START_S = 30.0
 """So long may processes take to start beyond a piece's own time-out [s]."""
@@ -257,7 +266,7 @@ def _spread(
 def _in_processes(recipe: Recipe, numbered: Iterable[Numbered], jobs: int, timeout_s: float | None) -> NumberedResults:
     # Only joblib's own processes are ours to end with this one.
     local = isinstance(get_active_backend()[0], BACKENDS["loky"])
-    with away_from_here() as ours:
+    with away_from_here() as ours, unheard() as hear:
         # One more than there are processes waits its turn: enough to keep them busy, few to be run in vain.
         parallel = Parallel(
             n_jobs=jobs,
@@ -269,6 +278,7 @@ def _in_processes(recipe: Recipe, numbered: Iterable[Numbered], jobs: int, timeo
         )
         tasks = (delayed(_do_numbered)(recipe, number, piece) for number, piece in numbered)
         with closing(cast(NumberedResults, parallel(tasks))) as results:
+            hear()
             yield from results
 
 
@@ -302,8 +312,10 @@ class IsolatedWorker:
             self._recipe = self._recipe or recipe_of(self._work)
             with away_from_here() as ours:
                 self._process = ProcessPoolExecutor(1, initializer=end_with, initargs=ours)
+                with unheard():
+                    loaded = self._process.submit(load_sent, self._recipe)
                 # Loading the work takes none of the pieces' time.
-                self._process.submit(load_sent, self._recipe).exception()
+                loaded.exception()
         how, clock, seconds = "", AwakeClock(), 0.0
         try:
             result = self._process.submit(do_sent, self._recipe, piece)

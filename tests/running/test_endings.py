@@ -123,8 +123,11 @@ import sys; sys.path.append({fakes!r})
 from deadly import Deadly
 from test_endings import EPISODES
 from proxytune.running.episodes import running
-with running(Deadly(faults=("agent0:*:hangs",)), EPISODES, 2) as outcomes: list(outcomes)
+with running(Deadly(faults={faults}), EPISODES, 2) as outcomes: list(outcomes)
 """
+
+
+HANGS = ("agent0:*:hangs",)
 
 
 def descendants(parent):
@@ -145,7 +148,7 @@ def descendants(parent):
 def test_workers_end_with_a_parent_that_is_killed_as_they_start(delay_s):
     folder = Path(__file__).parent
     path = os.pathsep.join([str(folder), ENVIRONMENT["PYTHONPATH"]])
-    command = [sys.executable, "-c", PARENT.format(fakes=str(folder.with_name("fakes")))]
+    command = [sys.executable, "-c", PARENT.format(fakes=str(folder.with_name("fakes")), faults=HANGS)]
     parent = subprocess.Popen(command, env={**ENVIRONMENT, "PYTHONPATH": path})
     while len(descendants(parent.pid)) < 2:
         time.sleep(0.005)
@@ -161,6 +164,25 @@ def test_workers_end_with_a_parent_that_is_killed_as_they_start(delay_s):
     for one in left:
         os.kill(one, signal.SIGKILL)
     assert not left
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="this system does not list processes in /proc")
+def test_workers_that_start_leave_the_signals_of_a_terminal_to_their_parent():
+    folder = Path(__file__).parent
+    path = os.pathsep.join([str(folder), ENVIRONMENT["PYTHONPATH"]])
+    command = [sys.executable, "-c", PARENT.format(fakes=str(folder.with_name("fakes")), faults=())]
+    told = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "text": True}
+    with subprocess.Popen(command, env={**ENVIRONMENT, "PYTHONPATH": path}, **told) as parent:
+        reached = set()
+        while parent.poll() is None:
+            for one in descendants(parent.pid):
+                for number in (signal.SIGINT, signal.SIGHUP):
+                    with contextlib.suppress(ProcessLookupError):
+                        os.kill(one, number)
+                        reached.add(one)
+        assert (parent.wait(), parent.stdout.read()) == (0, "")
+    assert len(reached) >= 2
 
 
 FEW = [make_episode({"trim": 0.1}, agent=f"agent{a}", start=s, seed=s) for a in range(2) for s in range(2)]

@@ -1,4 +1,5 @@
 from .beside import (
+    Heeding as Heeding,
     Interrupted as Interrupted,
     Packed as Packed,
     folders as folders,

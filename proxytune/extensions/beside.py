@@ -19,7 +19,7 @@ import io
 import signal
 import sys
 import zipfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from contextvars import ContextVar
 from functools import lru_cache
@@ -37,11 +37,12 @@ from proxytune.identity import digest, modules_beside
 class Interrupted(KeyboardInterrupt):
     """The user has pressed Ctrl-C; raised in the main thread."""
 
-    latest: ClassVar[KeyboardInterrupt] = KeyboardInterrupt()
+    latest: ClassVar[Callable[[], KeyboardInterrupt]] = KeyboardInterrupt
+    """Makes the latest anew: that one itself would keep all open which it has passed."""
 
     def __init__(self, *known: int) -> None:
         super().__init__(*known)
-        Interrupted.latest = self
+        Interrupted.latest = functools.partial(type(self), *known)
 
 
 def interrupt(number: int, frame: FrameType | None) -> None:
@@ -61,6 +62,20 @@ def is_users(problem: BaseException) -> bool:
     if signal.getsignal(signal.SIGINT) not in (interrupt, signal.SIG_IGN):
         return True
     return isinstance(problem, Interrupted) or isinstance(problem.__context__, Interrupted)
+
+
+class Heeding:
+    """Raises the user's Ctrl-C again where code that is not ours, called meanwhile, caught it or made another of it.
+
+    Else what such code then gives would count. Use as a context.
+    """
+
+    def __enter__(self) -> None:
+        self._before = Interrupted.latest
+
+    def __exit__(self, kind: object, problem: BaseException | None, trace: object) -> None:
+        if Interrupted.latest is not self._before and not (problem and is_users(problem)):
+            raise Interrupted.latest()
 
 
 _refusing: ContextVar[tuple[str, tuple[str, ...]] | None] = ContextVar("refusing", default=None)

@@ -19,7 +19,7 @@ from types import MappingProxyType, ModuleType
 from typing import Any, TypeVar
 
 from proxytune.errors import ExtensionError, ProxytuneError
-from proxytune.extensions.beside import check_runs, folders, import_beside, is_users
+from proxytune.extensions.beside import Heeding, check_runs, folders, import_beside, is_users
 from proxytune.settings import nearest
 
 GROUP = "proxytune"
@@ -146,7 +146,8 @@ def ask(
         ExtensionError: In one line, or what `refuse` makes, if it raises anything but an error of ours, or exits.
     """
     try:
-        return question()
+        with Heeding():
+            return question()
     except ProxytuneError:
         raise
     except BaseException as problem:

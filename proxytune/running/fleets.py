@@ -17,7 +17,7 @@ import numpy as np
 from proxytune.arrays import one_thread
 from proxytune.domain import DomainFamily, Episode, Outcome
 from proxytune.errors import EpisodeError, RunError
-from proxytune.extensions import describe, is_users, one_line, place_of
+from proxytune.extensions import Heeding, describe, is_users, one_line, place_of
 from proxytune.running.workers import AwakeClock, awake
 
 Fleet = tuple[Episode, ...]
@@ -47,7 +47,7 @@ def run_together(family: Any, episodes: Sequence[Episode], needed: Collection[st
     if not can_run_together(family):
         return None
     try:
-        with awake() as clock, one_thread(), _seeded(episodes[0].seed) as drawn:
+        with Heeding(), awake() as clock, one_thread(), _seeded(episodes[0].seed) as drawn:
             results = list(family.run_many(episodes))
             scored = [_judged(family, *pair, needed) for pair in zip(episodes, results, strict=True)]
             if drawn():
@@ -85,7 +85,7 @@ def run_episode(family: DomainFamily, episode: Episode, needed: Collection[str] 
     metrics: Mapping[str, float] | None = None
     failure, clock = "", AwakeClock()
     try:
-        with awake() as clock, one_thread(), _seeded(episode.seed):
+        with Heeding(), awake() as clock, one_thread(), _seeded(episode.seed):
             metrics = _checked(family, episode, family.run(episode), needed)
     except BaseException as problem:
         if is_users(problem):

@@ -198,7 +198,7 @@ def sqlite_errors_as_store_errors(path: Path) -> Iterator[None]:
     except sqlite3.Error as problem:
         # `digest_of` fails at nothing: a signal came meanwhile, and SQLite does not tell which.
         if "user-defined function" in str(problem):
-            raise Interrupted.latest from problem
+            raise Interrupted.latest() from problem
         raise _explained(path, problem) from problem
     except UnicodeDecodeError as problem:
         raise _corrupt(path, "it has text that is no UTF-8") from problem

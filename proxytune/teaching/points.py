@@ -19,7 +19,7 @@ from proxytune import learning
 from proxytune.arrays import one_thread
 from proxytune.domain import Classroom, Demonstration, Episode, OnPolicyClassroom, Policy, make_episode
 from proxytune.errors import EpisodeError, LearnerError, ProxytuneError
-from proxytune.extensions import describe, is_users, place_of
+from proxytune.extensions import Heeding, describe, is_users, place_of
 from proxytune.running import check_machine, limited, was_ended_in
 from proxytune.seeds import exam_seed, proxy_lessons_seed, round_seed, target_lessons_seed
 from proxytune.space import Interval, Space, Theta
@@ -44,7 +44,7 @@ def watching(what: str, timeout_s: float | None = None) -> Iterator[None]:
     It may take `timeout_s` [s], where processes may be ended (`limited`).
     """
     try:
-        with limited(what, timeout_s):
+        with Heeding(), limited(what, timeout_s):
             yield
     except BaseException as problem:
         if is_users(problem):

@@ -17,6 +17,7 @@ from processes import ENVIRONMENT
 from proxytune.cli.terminal import signals_as_interruptions
 from proxytune.domain import make_episode
 from proxytune.errors import RunError
+from proxytune.extensions import Interrupted
 from proxytune.running import Watch, episodes, run_episode, running
 from proxytune.running.episodes import MONITOR
 
@@ -44,21 +45,34 @@ def test_what_an_agent_raises_that_is_no_exception_fails_its_episode_alone(fault
 
 
 class Pressed(Deadly):
-    """Ctrl-C is pressed during each episode; the agent may catch that, and raise a KeyboardInterrupt of its own."""
+    """Ctrl-C is pressed during each episode; the agent may catch that, and raise something of its own."""
 
     def run(self, episode):
         try:
             signal.raise_signal(signal.SIGINT)
         except KeyboardInterrupt:
-            if self.faults:
+            if self.faults == ("by the agent",):
                 raise KeyboardInterrupt from None
-            raise
+            if self.faults == ("for another error",):
+                raise RuntimeError("the simulator ended") from None
+            if self.faults == ("to exit",):
+                sys.exit(0)
+            if not self.faults:
+                raise
+        return Deadly().run(episode)
 
 
 @pytest.mark.parametrize("place", [contextlib.nullcontext, signals_as_interruptions])
 @pytest.mark.parametrize("caught", [(), ("by the agent",)])
 def test_ctrl_c_is_nobodys_failure_in_python_and_on_the_command_line(place, caught):
     with pytest.raises(KeyboardInterrupt), place():
+        run_episode(Pressed(faults=caught), EPISODES[0])
+
+
+@pytest.mark.parametrize("caught", [("and goes on",), ("for another error",), ("to exit",)])
+def test_ctrl_c_that_an_agent_catches_is_neither_lost_nor_its_failure(caught):
+    """Else what the episode came to would be kept for good."""
+    with pytest.raises(Interrupted), signals_as_interruptions():
         run_episode(Pressed(faults=caught), EPISODES[0])
 
 

@@ -126,10 +126,16 @@ def transaction(connection: sqlite3.Connection, path: Path) -> Iterator[sqlite3.
     with sqlite_errors_as_store_errors(path):
         # Ctrl-C may come between any two lines: before the one that ends a transaction too.
         connection.rollback()
-        # It commits, or rolls back where a full disk has not done so already.
-        with connection:
-            connection.execute("BEGIN IMMEDIATE")
+        connection.execute("BEGIN IMMEDIATE")
+        try:
             yield connection
+            connection.commit()
+        except GeneratorExit:
+            # Python ends here what Ctrl-C left open, and so late that the transaction now may be another.
+            raise
+        except BaseException:
+            connection.rollback()  # where a full disk has not done so already
+            raise
 
 
 def write_row(connection: sqlite3.Connection, table: str, row: Mapping[str, Any]) -> bool:

@@ -297,8 +297,12 @@ class StudyRun:
         try:
             apart = kept_apart(store, self.settings, self.study.family, self.study.code, needed, watch)
             yield replace(watch, alone=apart | store.agents_that_failed(RAISED))
-        finally:
+        except GeneratorExit:  # What Ctrl-C left open ends when the store is closed
+            raise
+        except BaseException:
             store.begin_episode(identity)
+            raise
+        store.begin_episode(identity)
 
     def _keep(self, outcomes: Sequence[Outcome]) -> None:
         """Keep the outcomes of a fleet; what took too long for the first time is tried again by the next run."""

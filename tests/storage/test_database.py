@@ -467,3 +467,13 @@ def test_a_signal_that_comes_while_sqlite_asks_for_a_digest_is_no_damage(tmp_pat
     monkeypatch.setattr(database, "digest_of", lambda *values: interrupt(2, None))
     with pytest.raises(Interrupted), Store.open(tmp_path) as store:
         store.save_fact("budget", 12)
+
+
+def test_a_write_that_a_signal_left_open_takes_nothing_from_a_later_one_as_python_ends_it(tmp_path):
+    with Store.open(tmp_path) as store, closing(database.connect(tmp_path / "study.db", writable=True)) as connection:
+        left = database.transaction(connection, store.path)
+        left.__enter__()
+        with database.transaction(connection, store.path):
+            database.write_row(connection, "facts", {"key": "budget", "value": "12"})
+            del left
+        assert store.facts() == {"budget": 12}

@@ -23,7 +23,7 @@ _exit = os._exit
 def run() -> int:
     """Run the command line; its exit status."""
     _open_descriptors()
-    _on_signals(_end_before)
+    _on_signals(_end_at_once)
     for name in UNSET:
         os.environ.setdefault(name, "")
     if os.path.lexists("matplotlibrc"):
@@ -69,9 +69,11 @@ def _on_signals(handler: Callable[[int, FrameType | None], object]) -> None:
             signal.signal(number, handler)
 
 
-def _end_before(number: int, frame: FrameType | None) -> None:
-    """End at once: an exception might be caught by a library that is being imported."""
-    tell(f"proxytune: {STOPPING[signal.Signals(number)]} before anything began")
+def _end_at_once(number: int, frame: FrameType | None) -> None:
+    """End before a command is under way, or after: an exception might be caught by a library that is being imported."""
+    program, left = UNDER_WAY
+    said = f"{program}: {STOPPING[signal.Signals(number)]}"
+    tell(f"{said}; {left}" if left else f"{said} before anything began")
     _exit(128 + number)
 
 
@@ -104,7 +106,7 @@ class _Guard:
 
     def _told(self, how: str) -> None:
         program, left = UNDER_WAY
-        tell(f"{program}: code that is not proxytune's ended the process {how}; {left}")
+        tell(f"{program}: code that is not proxytune's ended the process {how}; {left or 'run it again'}")
 
     def _guard_c(self) -> Callable[[], object]:
         """Be told of `exit` in C; gives what takes that back, which must be before Python ends."""

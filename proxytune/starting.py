@@ -20,8 +20,8 @@ def tell(line: str) -> None:
         os.write(2, f"{line}\n".encode(errors="backslashreplace"))
 
 
-UNDER_WAY = ["proxytune", "run the same command again"]
-"""The command that is under way, and what its end leaves."""
+UNDER_WAY = ["proxytune", ""]
+"""The command that is under way, and what its end leaves; empty before it."""
 
 
 class LastingStream:

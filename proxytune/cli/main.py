@@ -13,7 +13,7 @@ import proxytune
 from proxytune.cli.commands import COMMANDS, add_options, epilog, names_in
 from proxytune.cli.terminal import FAILED, Answer, print_answer, prints_to_stderr, signals_as_interruptions, stopped_by
 from proxytune.errors import InputError, ProxytuneError
-from proxytune.extensions import running_none
+from proxytune.extensions import Interrupted, running_none
 from proxytune.settings import nearest
 from proxytune.starting import UNDER_WAY, lasting_stderr
 
@@ -122,36 +122,48 @@ def run_command(answer_of: Callable[[], Answer], arguments: argparse.Namespace, 
     An interruption is told with what it leaves, and what the same command does then.
     """
     UNDER_WAY[:] = program, left
-    with signals_as_interruptions(), lasting_stderr():
+    with lasting_stderr():
         try:
-            drawn: AbstractContextManager[None] = nullcontext()
-            if named := getattr(arguments, "format", ()):  # What draws figures is loaded only for that
-                from proxytune.report import figures_also_as
-
-                drawn = figures_also_as(named)
-            with drawn:
-                with prints_to_stderr():
-                    answer = answer_of()
-                print_answer(answer, as_json=arguments.json)
-        except ProxytuneError as problem:
-            _complain(program, str(problem))
-            return BAD_INPUT if isinstance(problem, InputError) else FAILED
-        except BaseException as problem:
-            stopping = KeyboardInterrupt | SystemExit | MemoryError | OSError
-            # A library may stumble over what the system refused it, and raise something else
-            cause = problem if isinstance(problem, stopping) else _refused(problem)
-            if cause is None:
-                raise
-            what, status = stopped_by(cause)
+            with signals_as_interruptions():
+                return _run(answer_of, arguments, program, left)
+        except Interrupted as problem:  # Just as signals begin or end to be heard so, or once more
+            what, status = stopped_by(problem)
             _complain(program, f"{what}; {left}")
             return status
+
+
+def _run(answer_of: Callable[[], Answer], arguments: argparse.Namespace, program: str, left: str) -> int:
+    try:
+        drawn: AbstractContextManager[None] = nullcontext()
+        if named := getattr(arguments, "format", ()):  # What draws figures is loaded only for that
+            from proxytune.report import figures_also_as
+
+            drawn = figures_also_as(named)
+        with drawn:
+            with prints_to_stderr():
+                answer = answer_of()
+            print_answer(answer, as_json=arguments.json)
+    except ProxytuneError as problem:
+        _complain(program, str(problem))
+        return BAD_INPUT if isinstance(problem, InputError) else FAILED
+    except BaseException as problem:
+        stopping = KeyboardInterrupt | SystemExit | MemoryError | OSError
+        # A library may stumble over a signal, or over what the system refused it, and raise something else
+        cause = problem if isinstance(problem, stopping) else _behind(problem)
+        if cause is None:
+            raise
+        what, status = stopped_by(cause)
+        _complain(program, f"{what}; {left}")
+        return status
     return DONE
 
 
-def _refused(problem: BaseException | None) -> MemoryError | OSError | None:
-    """What memory, disk or descriptors lacked, among what led to a problem."""
+def _behind(problem: BaseException | None) -> KeyboardInterrupt | MemoryError | OSError | None:
+    """The user's signal, or what memory, disk or descriptors lacked, among what led to a problem."""
     while problem is not None:
-        if isinstance(problem, MemoryError) or (isinstance(problem, OSError) and problem.errno in LACKING):
+        if isinstance(problem, Interrupted | MemoryError):
+            return problem
+        if isinstance(problem, OSError) and problem.errno in LACKING:
             return problem
         problem = problem.__cause__ or problem.__context__
     return None

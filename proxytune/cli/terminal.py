@@ -45,8 +45,10 @@ def signals_as_interruptions() -> Iterator[None]:
     """
     handlers = {signal.SIGTERM: _terminate, signal.SIGHUP: _terminate, signal.SIGINT: interrupt}
     heard = [number for number in handlers if signal.getsignal(number) is not signal.SIG_IGN]
-    before = {number: signal.signal(number, handlers[number]) for number in heard}
+    before = {number: signal.getsignal(number) for number in heard}
     try:
+        for number in heard:
+            signal.signal(number, handlers[number])
         yield
     finally:
         for number, handler in before.items():

@@ -81,6 +81,42 @@ def test_a_signal_while_libraries_are_loaded_is_one_line(tmp_path, number):
     assert done.stderr == f"proxytune: {STOPPING[number]} before anything began\n"
 
 
+HANDLED = """
+import os, signal, sys
+from proxytune import __main__
+number, moment = int(sys.argv.pop()), int(sys.argv.pop())
+handle, moments = signal.signal, iter(range(9))
+
+def then_sent(which, handler):
+    before = handle(which, handler)
+    if next(moments, None) == moment:
+        os.kill(os.getpid(), number)
+    return before
+
+def watched(handle_all):
+    signal.signal = then_sent
+    return handle_all()
+
+from proxytune.cli import main, terminal
+whole = main.run_command
+main.run_command = lambda *given, **more: watched(lambda: whole(*given, **more))
+raise SystemExit(__main__.run())
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("moment", range(6))
+def test_a_signal_as_a_command_begins_or_ends_to_hear_of_signals_is_one_line(moment):
+    """After each of the three handlers that are set, and after each that is taken back."""
+    number = (signal.SIGINT, signal.SIGTERM)[moment % 2]
+    words = [sys.executable, "-c", HANDLED, "list", "robots", str(moment), str(int(number))]
+    how = {"capture_output": True, "text": True, "env": ENVIRONMENT, "preexec_fn": heeding_ctrl_c}
+    done = subprocess.run(words, check=False, **how)
+    left = COMMANDS["list"].left
+    assert (done.returncode, done.stderr) == (128 + number, f"proxytune list: {STOPPING[number]}; {left}\n")
+    assert bool(done.stdout) == (moment > 2)
+
+
 @pytest.mark.slow
 def test_what_is_ignored_stays_so_as_after_nohup(make_study):
     folder = make_study(domain=SLOWLY, jobs="2", **FEW)

@@ -141,6 +141,14 @@ def test_an_interruption_says_whether_the_same_command_goes_on(failing, refused,
     assert told in refused("list", "robots", status=130)
 
 
+def test_an_interruption_that_a_library_made_another_error_of_is_told_as_one(failing, refused):
+    """As Python 3.11 does of what comes while a class is made."""
+    problem = RuntimeError("Error calling __set_name__")
+    problem.__cause__ = Interrupted()
+    failing(problem)
+    assert refused("list", "robots", status=130).startswith("proxytune list: interrupted; ")
+
+
 def test_what_is_not_json_is_a_defect_and_not_printed_but_a_path_that_is_no_utf_8_is(monkeypatch, capsys):
     monkeypatch.setattr(listing, "run", lambda arguments: Answer({"value": float("nan")}, ""))
     with pytest.raises(ValueError, match="JSON"):

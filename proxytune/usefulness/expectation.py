@@ -22,7 +22,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from proxytune.arrays import NORMAL_95, Flags, Floats, Whole
+from proxytune.arrays import NORMAL_95, Flags, Floats
 from proxytune.scores import Metric, ScoreTable
 from proxytune.usefulness.comparison import Comparison, compare, start_places
 from proxytune.usefulness.decision import Difference
@@ -147,7 +147,7 @@ def expect(
     rng, sides = np.random.default_rng(seed), [compare(proxy=one, target=target, metrics=metrics) for one in fresh]
     means, known = sides[0].target.means, len(donors.first) > 0
     proxies = np.stack([side.proxy.means for side in sides])
-    draws = [_again(one.proxy, donors, rng, np.arange(len(one.proxy.episodes))[None]) for one in sides] if known else []
+    draws = [np.nanmean(_again(one.proxy, donors, rng), axis=2) for one in sides] if known else []
     of_target = donors
     if donors.still:  # The target's starts driven twice, or where there are none its episodes from different starts
         scored, places = sides[0].target.values, start_places(sides[0].target)
@@ -213,12 +213,12 @@ def _expected(
     return Expected(value, floor, Estimate(more, more - wide, more + wide)), float(np.sqrt(variance))
 
 
-def _again(table: ScoreTable, donors: Donors, rng: np.random.Generator, columns: Whole) -> Floats:
-    """Mean scores of a table repeated: (draws, agents, metrics); in each draw these columns of it (draws or 1, n)."""
+def _again(table: ScoreTable, donors: Donors, rng: np.random.Generator) -> Floats:
+    """The cells of a table repeated: (draws, agents, episodes, metrics)."""
     driven = table.driven
     values = np.full((DRAWS, *table.values.shape), np.nan)
     values[:, driven] = donors.again(table.values[driven], rng)
-    return np.asarray(np.nanmean(np.take_along_axis(values, columns[:, None, :, None], axis=2), axis=2))
+    return values
 
 
 def _perfect(sides: Comparison, donors: Donors, rng: np.random.Generator) -> Floats:
@@ -231,4 +231,9 @@ def _perfect(sides: Comparison, donors: Donors, rng: np.random.Generator) -> Flo
     if not sides.paired:
         drawn = rng.integers(count, size=(DRAWS, len(sides.proxy.episodes)))
         each = np.take_along_axis(each, drawn, axis=1)
-    return _again(sides.target, donors, rng, each)
+    values = _again(sides.target, donors, rng)
+    # A new repeat of a cell is off the mean of R by (1 + 1/R) of its variance, one of the R by (1 − 1/R), and a change
+    # is 2: so one in R changes.
+    alike = rng.random(values.shape[:3]) >= 1.0 / np.bincount(places)[places]
+    values = np.where(alike[..., None], sides.target.values, values)
+    return np.asarray(np.nanmean(np.take_along_axis(values, each[:, None, :, None], axis=2), axis=2))

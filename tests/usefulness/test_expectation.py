@@ -80,6 +80,22 @@ def test_intervals_hold_what_is_expected_with_four_starts():
     assert np.mean([said.excess.low <= more <= said.excess.high for said, _, more in found]) > 0.9
 
 
+@pytest.mark.parametrize("repeats", [1, 2, 4])
+def test_the_floor_is_what_a_perfect_proxy_scores_however_often_the_target_was_measured(repeats):
+    """A target of several repeats is nearer to what is expected of it, and so is a perfect proxy to the target."""
+    floors, scores = [], []
+    labels = [f"{start}/{repeat}" for repeat in range(repeats) for start in range(STARTS)]
+    for seed in range(12):
+        rng, robot = np.random.default_rng((seed, 9)), Fleet(seed, noise=0.8)
+        measured = np.concatenate([robot.drive(rng) for _ in range(repeats)], axis=1)
+        donors = donors_of([np.stack([robot.drive(rng), robot.drive(rng)]) for _ in range(6)], 2)
+        target, fresh = table(measured, labels), [table(robot.drive(rng), map(str, range(STARTS)))]
+        floors.append(expect(fresh=fresh, target=target, metrics=M, donors=donors, seed=seed).prpv.floor.value)
+        perfect = np.stack([robot.drive(rng).mean(axis=1) for _ in range(100)])
+        scores.append(prpv_of_means(perfect, measured.mean(axis=1), M).mean())
+    assert np.mean(floors) == pytest.approx(np.mean(scores), rel=0.15)
+
+
 def test_a_proxy_that_is_far_off_is_told_from_a_perfect_one_and_the_target_itself_is_not():
     far, itself = (studied(5, sign=sign)[0] for sign in (-1.0, 1.0))
     assert far.excess.low > 0.0 >= itself.excess.low

@@ -190,8 +190,9 @@ class Knowledge:
         return tuple((names[i], names[j], value) for i, j, value in self.posterior.trades)
 
     def holds(self, values: Values) -> bool:
-        """Tell whether a θ of the box is in the 95 % region."""
-        return bool(self.log(to_unit(self.space, values)[None])[0] >= self.posterior.threshold)
+        """Tell whether a θ is in the 95 % region, which ends where the box does."""
+        within = all(box.low <= value <= box.high for box, value in zip(self.space.intervals, values, strict=True))
+        return within and bool(self.log(to_unit(self.space, values)[None])[0] >= self.posterior.threshold)
 
     def scores(self, points: Sequence[Values]) -> tuple[Floats, Floats]:
         """Mean and standard deviation of what PRPV is expected to be at points of the box, rough and noise left out."""

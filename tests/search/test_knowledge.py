@@ -1,11 +1,15 @@
 """What is known of θ after a search: the truth is inside, who tells what is told, and nothing depends on order."""
 
+import itertools
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from steps import SPACE, goal
 
 from proxytune.search import Trial, fit_surrogate, from_unit, importances, learn_theta, to_unit
 from proxytune.search.engine import design_point
+from proxytune.search.posterior import Misfit, posterior_of
 from proxytune.space import Interval, Space
 
 IMPORTANCE_SPACE = Space((Interval("strong", 0.0, 1.0), Interval("weak", -1.0, 1.0), Interval("dead", 0.0, 5.0)))
@@ -88,6 +92,17 @@ def test_the_region_holds_the_truth_and_is_small():
     assert np.median([one.posterior.share for one in found]) < 0.10
     for one in found:
         assert {name: low < high for name, (low, high) in one.intervals.items()} == {"delay": True, "trim": True}
+
+
+def test_the_region_ends_where_the_box_does():
+    one = known(3)
+    # Of a flat density every θ would be in the region.
+    vars(one).update(_posterior_if_it_fits=posterior_of(lambda points: np.zeros(len(points)), 2))
+    vars(one).update(likelihood=SimpleNamespace(log=lambda points: np.zeros(len(points))), misfit=Misfit(1.0, 1.0, 0.5))
+    ends = [(box.low, box.high) for box in SPACE.intervals]
+    assert all(one.holds(corner) for corner in itertools.product(*ends))
+    assert not one.holds((ends[0][1] + 1e-9, ends[1][0]))
+    assert not one.holds((ends[0][0], ends[1][0] - 1e-9))
 
 
 def test_the_answer_has_the_lowest_expected_score_with_what_is_as_good_and_who_tells_of_a_parameter():

@@ -359,7 +359,7 @@ class Shape:
 
     best: tuple[float, ...]  # the values of the parameter where the measure is best; empty if it is defined nowhere
     score: float | None  # its score there
-    near_best: tuple[float, ...]  # the values where it is not worse than the best beyond noise
+    near_best: tuple[float, ...]  # the values where it is not worse beyond noise than any of the best
     worse: tuple[float, ...]  # those where it is; of others, without an interval, that is not known
     held: float | None  # where the parameter is held when others are swept; None if that was not said
     # what the measure does from there downwards: "worsens" if it never gets better again beyond noise and ends up
@@ -389,7 +389,8 @@ def shape_of(series: Series, held: float | None) -> Shape:
     lows, highs = np.minimum(costs, ends.min(axis=1)), np.maximum(costs, ends.max(axis=1))
     values, best = list(known), costs == costs.min()
     told = np.array([one.interval is not None for one in known.values()])
-    near = lows <= np.where(told, highs, costs)[best].max()
+    # Of several that are best, what is beyond noise of one is worse.
+    near = lows <= np.where(told, highs, costs)[best].min()
     masks = (best, best | (told & near), told & ~near & ~best)
     at_best, near_best, worse = (tuple(itertools.compress(values, mask)) for mask in masks)
     sides = (_side(values[::-1], lows[::-1], highs[::-1], held), _side(values, lows, highs, held))

@@ -296,6 +296,13 @@ def test_the_score_of_a_shape_and_its_line_say_what_each_side_does():
     assert sweep.shape_of(series([1.0, 5.0], None), None).near_best == (0.0,)
 
 
+def test_what_is_beyond_noise_of_one_of_the_best_is_worse():
+    tied = series([1.0, 2.6, 1.0, 4.0], 0.6)
+    vague = replace(tied, estimates={**tied.estimates, 2.0: sweep.Measured(1.0, (0.0, 9.0))})
+    shape = sweep.shape_of(vague, None)
+    assert (shape.best, shape.near_best, shape.worse) == ((0.0, 2.0), (0.0, 2.0), (1.0, 3.0))
+
+
 @settings(max_examples=50)
 @given(st.lists(st.floats(-5, 5), min_size=3, max_size=9), st.data())
 def test_the_mirror_image_of_a_curve_has_mirrored_sides(scores, data):

@@ -175,6 +175,9 @@ def test_unidentified_parameters_have_no_interval_values_outside_theirs_have_and
     assert "add an agent or a metric whose scores change with delay (so far agent4's do most), or a log" in text
     nothing = said((DELAY, replace(DELAY, name="blur")), **ABOVE, information=())
     assert nothing.startswith("θ is unknown: delay and blur are unidentified.")
+    perfect = said((DELAY,), information=())
+    assert perfect.startswith("θ is unknown: delay is unidentified. PRPV (")
+    assert " Next: to know delay better, add an agent or a metric whose scores change with delay" in perfect
     silent = replace(TOLD[0], agents=(("agent0", 0.0),))
     assert "so far" not in said((TRIM, DELAY), **ABOVE, information=(silent, TOLD[1]))
     text = said((replace(TRIM, best=0.2), PITCH), **ABOVE)

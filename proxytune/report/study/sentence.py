@@ -43,10 +43,10 @@ def _say_theta(result: StudyResult) -> str:
     if misfit.fits is False:
         told = "" if misfit.p_value is None else f" ({probability(misfit.p_value)})"
         return f"{so_far}The proxy lacks something: no θ explains the target's scores{told}."
-    if result.perfect:
-        return f"{so_far}θ found: {_say_parameters(parameters)}."
     if not any(one.identified for one in parameters):
         return f"{so_far}θ is unknown: {_say_parameters(parameters)}."
+    if result.perfect:
+        return f"{so_far}θ found: {_say_parameters(parameters)}."
     share = percent(result.knowledge.posterior.share)
     return f"{so_far}θ narrowed down to {share} of the box: {_say_parameters(parameters)}."
 
@@ -128,7 +128,8 @@ def say_next_step(result: StudyResult) -> str:
     if not _is_fresh(result):
         return f"{'' if settings.confirm else 'set confirm = 1 and '}run the study again, to drive the best θ afresh"
     if result.perfect:
-        return f"use this θ; to know {plain(_least_known(result).name)} better, {_say_what_to_add(result)}"
+        found = "use this θ; " if any(one.identified for one in known_parameters(result)) else ""
+        return f"{found}to know {plain(_least_known(result).name)} better, {_say_what_to_add(result)}"
     # Where no trial has come into the region yet, starts are not what is missing.
     return f"{_say_what_to_add(result) if result.inside else _more_trials(result)}, to get closer"
 

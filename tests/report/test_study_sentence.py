@@ -7,6 +7,7 @@ import pytest
 from confirmations import LACKS, TOLD, planted
 
 from proxytune.report.study.sentence import KnownParameter, declared_of, known_parameters, say_answer, study_sentence
+from proxytune.scores import Metric
 from proxytune.search import Information
 from proxytune.space import Interval
 from proxytune.study import DEFAULT_FAMILY
@@ -25,7 +26,7 @@ CHANCE, EXPLAINING = (Chance(65.8, 13.7, p_value, 1000) for p_value in (0.001, 0
 
 def study(parameters=(TRIM, PITCH, BLUR), *, names=("trim", "delay"), family=DEFAULT_FAMILY, fresh=True, **changes):
     """As much of a study as a sentence tells, with changes of it, of its settings or of what is known."""
-    settings = {"budget": 24, "starts": 4, "confirm": 1, "learn_from": ()}
+    settings = {"budget": 24, "starts": 4, "confirm": 1, "learn_from": (), "metrics": (Metric("distance"),)}
     known = {"fits": True, "p_value": 0.4, "information": (TOLD_BY_STARTS,), "share": 0.0016}
     facts = {"perfect": True, "inside": True, "floor": FLOOR, "excess": EXCESS, "stopped": "the budget is spent"}
     facts |= {"prpv": PRPV, "nominal": None, "chance": CHANCE, "trials": range(24), "most_starts": 10}
@@ -152,13 +153,26 @@ def test_without_fresh_episodes_or_before_its_end_a_study_says_so_and_how_to_go_
     unconfirmed = said(**ABOVE, fresh=False, confirm=0)
     assert "is 16 in the search's own episodes, which may be partly luck." in unconfirmed
     assert unconfirmed.endswith("Next: set confirm = 1 and run the study again, to drive the best θ afresh.")
-    assert "smaller tolerances" in said(chance=Chance(0.0, 0.0, 1.0, 1000))
     assert said(**ABOVE, fresh=False, rescored=True).endswith("to a new study, with learn_from = [this one].")
     assert "set confirm" not in said(**ABOVE, fresh=False)
     assert "perfect" not in unconfirmed
     text = said(**ABOVE, stopped="", trials=range(14))
     assert text.startswith("14 of 24 trials so far. θ narrowed down")
     assert text.endswith("Next: run the study again for the 10 trials that are left.")
+
+
+@pytest.mark.parametrize(
+    ("metrics", "step"),
+    [
+        (["distance:max"], "give other agents"),
+        (["distance:max", "time:min"], "give other agents, or fewer metrics"),
+        (["distance:max:5%"], "give other agents, or smaller tolerances"),
+        (["distance:max:5", "time:min"], "give other agents, or smaller tolerances, or fewer metrics"),
+    ],
+)
+def test_where_the_target_ranks_no_agent_above_another_it_is_said_and_what_would_rank_them(metrics, step):
+    text = said(chance=Chance(0.0, 0.0, 1.0, 1000), metrics=tuple(map(Metric.parse, metrics)))
+    assert text.endswith(f" Next: {step}: on the target none of these agents ranks above another.")
 
 
 def test_where_noise_is_not_known_nothing_is_said_of_a_perfect_proxy_and_the_nominal_stands_beside():

@@ -166,7 +166,7 @@ def stopped(run: StudyRun, done: Sequence[TrialRecord]) -> str:
         return "the budget is 0 trials: earlier studies alone tell"
     if len(done) >= settings.budget:
         kept = f"; all {len(done)} that are finished count" if len(done) > settings.budget else ""
-        return f"the budget of {settings.budget} trials is spent{kept}"
+        return f"the budget of {settings.budget} trial{'' if settings.budget == 1 else 's'} is spent{kept}"
     if search.batch_at(len(done), settings.batch, settings.initial).start < len(done):
         return ""
     if rules.wall_time_s is not None and (late := out_of_time(seconds_of(run, done), rules)):

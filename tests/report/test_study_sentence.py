@@ -127,6 +127,7 @@ def test_the_next_step_asks_for_no_more_trials_or_starts_than_help():
     assert said(**ABOVE, inside=False).endswith("Next: raise budget from 24 to 48, to get closer.")
     assert "raise starts from 4 to 5 " in said(**ABOVE, most_starts=5)
     assert "add agents or metrics: all 4 starts are driven" in said(**ABOVE, most_starts=4)
+    assert "add agents or metrics: its only start is driven, to" in said(**ABOVE, starts=1, most_starts=1)
     told = said(**ABOVE, learn_from=("bank",), budget=0, trials=())
     assert "raise budget from 0 to 8 (starts limit it too, but more of them would leave the earlier trials out)" in told
     assert "raise starts" not in told

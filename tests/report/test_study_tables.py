@@ -225,6 +225,8 @@ def test_a_parameter_without_an_interval_is_unidentified_and_pairs_that_trade_ar
     vague = planted(known, deviation=(3.0, 0.02))
     assert page.theta_table(vague).rows[0][2] == "unidentified"
     assert page.theta_table(vague).notes[0].startswith("7 trials exclude almost no value of delay; unidentified")
+    alone = page.theta_table(replace(vague, trials=vague.trials[:1])).notes
+    assert alone[0].startswith("1 trial excludes almost no value of delay; unidentified")
     assert not [line for line in page.theta_table(known).notes if "unidentified" in line]
     trading = planted(known, centre=(0.5, 0.5), deviation=(0.1, 0.1), correlation=-0.9)
     assert any(

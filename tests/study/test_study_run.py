@@ -2,6 +2,7 @@
 
 import sqlite3
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -368,3 +369,9 @@ def test_budget_and_jobs_alone_change_and_learning_value_has_its_budget_elsewher
     with pytest.raises(InputError, match=r"study.toml: budget: .*set teaching.budget in this file instead"):
         with_spending(study, budget=4)
     assert with_spending(study, jobs=4).settings.jobs == 4
+
+
+def test_one_trial_is_spent_as_one():
+    run = SimpleNamespace(settings=SimpleNamespace(budget=1, stop=None))
+    assert stopped(run, [None]) == "the budget of 1 trial is spent"
+    assert stopped(run, [None, None]) == "the budget of 1 trial is spent; all 2 that are finished count"

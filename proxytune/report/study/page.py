@@ -66,7 +66,8 @@ def _theta_notes(result: StudyResult) -> list[str]:
     """Say what is not identified, what is odd about the best θ, and which parameters trade off; most needed first."""
     space, learnt, notes = result.study.settings.space, result.knowledge, list[str]()
     if learnt.unidentified:
-        few = f"{len(result.trials) + result.earlier} trials exclude almost no value of"
+        count = len(result.trials) + result.earlier
+        few = f"{count} trials exclude almost no value of" if count != 1 else "1 trial excludes almost no value of"
         names = listed(list(map(plain, learnt.unidentified)))
         notes.append(f"{few} {names}; unidentified: the interval fills more than 0.9 of the range")
     if not result.inside:

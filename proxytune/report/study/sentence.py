@@ -161,7 +161,8 @@ def _say_what_to_add(result: StudyResult) -> str:
     if settings.learn_from:
         return f"{_more_trials(result)} (starts limit it too, but more of them would leave the earlier trials out)"
     if settings.starts == most_starts:
-        return f"add agents or metrics: all {settings.starts} starts are driven"
+        driven = "its only start is driven" if most_starts == 1 else f"all {most_starts} starts are driven"
+        return f"add agents or metrics: {driven}"
     more = min(2 * settings.starts, most_starts)
     return f"raise starts from {settings.starts} to {more} and measure the target from them too"
 

@@ -11,6 +11,7 @@ from searched import looked_at, searched
 
 from proxytune.report import study_document, study_sentence, study_text
 from proxytune.report.study import page
+from proxytune.search.posterior import Misfit
 from proxytune.space import Interval
 from proxytune.study import Preflight, open_study
 from proxytune.study.preflight import Movement
@@ -139,6 +140,8 @@ def test_what_is_expected_a_perfect_proxy_s_score_the_excess_and_whether_any_the
     lacking = row_of(page.usefulness_table(planted(result, misfit=LACKS)), "misfit (p)")
     assert (lacking[1], lacking[3]) == ("0.002", "no θ explains the target's scores")
     assert "too few" in row_of(page.usefulness_table(planted(result, misfit=UNTOLD)), "misfit (p)")[3]
+    silent = row_of(page.usefulness_table(planted(result, misfit=Misfit(None, None, None))), "misfit (p)")
+    assert silent[1:] == ("–", "", "no test whether any θ explains the target's scores: these tell nothing of θ")
 
 
 def test_how_a_study_came_to_its_end_what_matters_and_what_was_cut_off_and_saved_is_said(result):

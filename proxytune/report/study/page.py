@@ -110,8 +110,8 @@ def usefulness_table(result: StudyResult) -> Table:
         rows.append(("PPV", f"{own.ppv.value:.3g}", "", meaning))
     misfit = result.knowledge.misfit
     if misfit.p_value is None:
-        few = "too few complete trials to test whether any θ explains the target's scores"
-        rows.append((MISFIT, "–", "", few))
+        why = "these tell nothing of θ" if misfit.deviance is None else "too few complete trials"
+        rows.append((MISFIT, "–", "", f"no test whether any θ explains the target's scores: {why}"))
     else:
         fits = "some θ may explain" if misfit.fits else "no θ explains"
         rows.append((MISFIT, f"{misfit.p_value:.2g}", "", f"{fits} the target's scores"))

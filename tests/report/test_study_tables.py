@@ -130,6 +130,11 @@ def test_what_is_expected_a_perfect_proxy_s_score_the_excess_and_whether_any_the
     assert row_of(table, "PRPV")[1:] == ("12", "8 to 20", "wrongly ordered pairs, 0 to 30; expected, in 5 more runs")
     assert row_of(table, "  noise floor")[1:] == ("5", "1 to 10", "what a perfect proxy scores against this target")
     assert row_of(table, "  excess") == ("  excess", "7", "−2 to 19", "more than a perfect proxy; may be none")
+    # All below: 12 − 20, its ends 8 − 31 and 20 − 21.
+    below = page.usefulness_table(confirmed(result, kind="same starts", value=20.0, low=21.0, high=31.0))
+    assert row_of(below, "  excess") == ("  excess", "−8", "−23 to −1", "less than a perfect proxy, so not worse")
+    touching = page.usefulness_table(confirmed(result, kind="same starts", value=20.0, low=20.2, high=31.0))
+    assert row_of(touching, "  excess")[2:] == ("−23 to 0", "more than a perfect proxy; may be none")
     document = study_document(again)
     assert document["best"]["expected_prpv"] == {"value": 12, "interval": [8.0, 20.0]}
     assert document["excess"]["value"] == 7.0

@@ -2,6 +2,7 @@
 
 import shlex
 from collections.abc import Mapping, Sequence
+from math import ceil
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,7 @@ from proxytune.report.wording import fixed, listed, pairs_span, percent, plain, 
 from proxytune.report.writing import ABOUT, picture_of, write_text
 from proxytune.storage import TrialRecord
 from proxytune.study import LEARNING, PRPV, StudyResult, StudySettings
-from proxytune.usefulness import LEFT_OUT, PAIRED, PERFECT
+from proxytune.usefulness import LEFT_OUT, PAIRED, PERFECT, Estimate
 
 Rows = list[tuple[str, ...]]
 THETA, INFORMATION, SEARCH = "Parameters", "What informs each parameter", "Search"
@@ -94,8 +95,7 @@ def usefulness_table(result: StudyResult) -> Table:
         meaning = floor.meaning if expected is None else "what a perfect proxy scores against this target"
         rows.append((f"  {floor.title}", fixed(floor.value, 0), pairs_span(floor.low, floor.high), meaning))
     if excess := result.excess:
-        told = "more than a perfect proxy" if excess.low > 0.0 else "more than a perfect proxy; may be none"
-        rows.append(("  excess", fixed(excess.value, 0), pairs_span(*excess[1:]), told))
+        rows.append(("  excess", fixed(excess.value, 0), pairs_span(*excess[1:]), _say_excess(excess)))
     if result.nominal:
         level = result.nominal.expected.prpv.value
         rows.append(("  nominal", fixed(level.value, 0), pairs_span(*level[1:]), "the simulator as it is"))
@@ -118,6 +118,12 @@ def usefulness_table(result: StudyResult) -> Table:
     columns = (*columns_of(("measure",), ("value", "interval")), Column("meaning"))
     notes = tuple(note for note in result.judged.notes if note not in (PAIRED, PERFECT, LEFT_OUT))
     return Table(USEFULNESS, columns, tuple(rows), notes)
+
+
+def _say_excess(excess: Estimate) -> str:
+    if ceil(excess.high) < 0:
+        return "less than a perfect proxy, so not worse"
+    return "more than a perfect proxy" if excess.low > 0.0 else "more than a perfect proxy; may be none"
 
 
 def _objective_rows(result: StudyResult) -> Rows:

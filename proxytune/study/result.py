@@ -13,7 +13,7 @@ from typing import Literal, cast
 from proxytune.errors import InputError, RunError
 from proxytune.running import ENDLESS
 from proxytune.scores import Metric
-from proxytune.search import History, Importance, Knowledge, PastTrial, fit_surrogate, importances
+from proxytune.search import History, Importance, Information, Knowledge, PastTrial, fit_surrogate, importances
 from proxytune.settings import nearest
 from proxytune.space import Theta
 from proxytune.storage import TrialRecord
@@ -107,6 +107,18 @@ class StudyResult:
         """
         excess, fits = self.excess, self.knowledge.misfit.fits is not False and self.inside
         return excess is not None and excess.low <= 0.0 and not self.judged.chance.explains and fits
+
+    @property
+    def dead(self) -> frozenset[str]:
+        """The parameters that changed no episode at all as the pre-flight moved each by itself."""
+        moved = self.preflight.movements if self.preflight else ()
+        return frozenset(one.interval.name for one in moved if one.dead and one.pairs)
+
+    @property
+    def information(self) -> tuple[Information, ...]:
+        """Information of agents and metrics on each parameter; none on those that nothing shows to change anything."""
+        silent = self.dead & set(self.knowledge.unidentified)
+        return tuple(one for one in self.knowledge.information if one.name not in silent)
 
     def value_of(self, trial: TrialRecord) -> float | None:
         """The objective of a finished trial; None of any other."""

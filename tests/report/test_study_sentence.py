@@ -27,10 +27,10 @@ CHANCE, EXPLAINING = (Chance(65.8, 13.7, p_value, 1000) for p_value in (0.001, 0
 def study(parameters=(TRIM, PITCH, BLUR), *, names=("trim", "delay"), family=DEFAULT_FAMILY, fresh=True, **changes):
     """As much of a study as a sentence tells, with changes of it, of its settings or of what is known."""
     settings = {"budget": 24, "starts": 4, "confirm": 1, "learn_from": (), "metrics": (Metric("distance"),)}
-    known = {"fits": True, "p_value": 0.4, "information": (TOLD_BY_STARTS,), "share": 0.0016}
+    known = {"fits": True, "p_value": 0.4, "share": 0.0016}
     facts = {"perfect": True, "inside": True, "floor": FLOOR, "excess": EXCESS, "stopped": "the budget is spent"}
     facts |= {"prpv": PRPV, "nominal": None, "chance": CHANCE, "trials": range(24), "most_starts": 10}
-    facts |= {"rescored": False}
+    facts |= {"rescored": False, "information": (TOLD_BY_STARTS,)}
     for given in (settings, known, facts):
         given |= {key: changes.pop(key) for key in list(changes) if key in given}
     assert not changes
@@ -51,7 +51,6 @@ def study(parameters=(TRIM, PITCH, BLUR), *, names=("trim", "delay"), family=DEF
             intervals={one.name: one.interval for one in parameters},
             unidentified=[one.name for one in parameters if not one.identified],
             misfit=Namespace(fits=known["fits"], p_value=known["p_value"]),
-            information=known["information"],
             posterior=Namespace(share=known["share"]),
         ),
         judged=judged,

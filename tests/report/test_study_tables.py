@@ -265,3 +265,23 @@ def test_per_parameter_what_informs_it_most_is_named_with_what_limits_it_and_not
     )
     silent = replace(TOLD[0], agents=(("agent0", 0.0), ("agent1", 0.0)))
     assert [row[0] for row in page.information_table(planted(known, information=(silent, TOLD[1]))).rows] == ["trim"]
+
+
+def preflown(result, **changes):
+    """The result after a pre-flight in which the delay did nothing, with changes of how it did."""
+    movement = Movement(Interval("delay", 0.0, 0.3), 1.0, "distance", 0.0, 0.5, 12, True)
+    return replace(result, preflight=Preflight({"delay": 0.15, "trim": 0.0}, (replace(movement, **changes),), 144))
+
+
+def test_a_parameter_that_changed_nothing_is_informed_by_none_and_an_interval_of_it_is_called_chance(known):
+    vague = planted(confirmed(known, 3, (1.0, 5.0), value=3.0, low=1.0, high=5.0), (0.4, 0.72), (3.0, 0.02))
+    names = [[row[0] for row in page.information_table(one).rows] for one in (vague, preflown(vague))]
+    assert names == [["delay", "trim"], ["trim"]]
+    assert "with delay (so far agent4's do most)" in study_sentence(vague)
+    assert "with delay." in study_sentence(preflown(vague))
+    for dead, untested in ((vague, preflown(vague, pairs=0)), (preflown(known, dead=False), preflown(known, pairs=0))):
+        assert len(page.information_table(dead).rows) == len(page.information_table(untested).rows) == 2
+        assert not [note for note in page.theta_table(untested).notes if "chance" in note]
+    assert (
+        page.theta_table(preflown(known)).notes[0].startswith("delay changed nothing at all in the pre-flight: unless")
+    )

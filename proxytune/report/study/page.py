@@ -71,6 +71,8 @@ def _theta_notes(result: StudyResult) -> list[str]:
         few = f"{count} trials exclude almost no value of" if count != 1 else "1 trial excludes almost no value of"
         names = listed(list(map(plain, learnt.unidentified)))
         notes.append(f"{few} {names}; unidentified: the interval fills more than 0.9 of the range")
+    chance = "changed nothing at all in the pre-flight: unless it acts together with another, its interval is chance"
+    notes += [f"{plain(name)} {chance}" for name in space.names if name in result.dead - set(learnt.unidentified)]
     if not result.inside:
         notes.append("the best θ by PRPV is outside the 95 % region, which uses every metric of every agent")
     if result.truth is not None and set(space.names) <= set(result.truth):
@@ -164,7 +166,7 @@ def information_table(result: StudyResult) -> Table:
 
     rows = tuple(
         (one.name, agents, largest(one.metrics, METRICS), one.limit)
-        for one in result.knowledge.information
+        for one in result.information
         if (agents := largest(one.agents, AGENTS))
     )
     return Table(INFORMATION, columns_of(("parameter", "most informative agents", "metric", "limited by")), rows)

@@ -150,7 +150,7 @@ def _least_known(result: StudyResult) -> KnownParameter:
 def _say_what_to_add(result: StudyResult) -> str:
     """Say what to add to learn more of the least known parameter."""
     settings, least, most_starts = result.study.settings, _least_known(result), result.study.family.starts
-    told = (one for one in result.knowledge.information if one.name == least.name)
+    told = (one for one in result.information if one.name == least.name)
     informed = next((one for one in told if any(share > 0.0 for _, share in one.agents)), None)
     if not least.identified:
         best = f" (so far {informed.agents[0][0]}'s do most)" if informed else ""

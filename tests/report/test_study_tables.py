@@ -170,7 +170,8 @@ def test_how_a_study_came_to_its_end_what_matters_and_what_was_cut_off_and_saved
     }
     assert page.search_table(flown).rows[1] == ("pre-flight", "every parameter changes some metric beyond noise")
     still = replace(flown.preflight, movements=(replace(moved, p_value=0.5),))
-    label, warning = page.search_table(replace(flown, preflight=still)).rows[1]
+    vague = planted(replace(flown, preflight=still), deviation=(0.05, 3.0))
+    label, warning = page.search_table(vague).rows[1]
     assert (label, warning.startswith("'trim' is not shown to change a metric")) == ("pre-flight", True)
     assert flown.episodes == result.episodes + 144
     assert not row_of(page.search_table(result), "stopped early")
@@ -285,3 +286,15 @@ def test_a_parameter_that_changed_nothing_is_informed_by_none_and_an_interval_of
     assert (
         page.theta_table(preflown(known)).notes[0].startswith("delay changed nothing at all in the pre-flight: unless")
     )
+
+
+def test_a_warning_of_the_preflight_is_left_out_once_trials_have_identified_the_parameter(known):
+    vague = planted(known, deviation=(3.0, 0.02))
+    found = preflown(known, dead=False)
+    assert row_of(page.search_table(found), "pre-flight")[1] == (
+        "every parameter changes some metric beyond noise or is identified"
+    )
+    for changes in ({"dead": True}, {"pairs": 0}):
+        assert row_of(page.search_table(preflown(known, **changes)), "pre-flight")[1].startswith("'delay' ")
+    warned = row_of(page.search_table(preflown(vague, dead=False)), "pre-flight")[1]
+    assert warned.startswith("'delay' is not shown to change a metric")

@@ -18,7 +18,7 @@ from proxytune.report.view import Column, Drawn, Foot, Paragraphs, Part, Table, 
 from proxytune.report.wording import fixed, listed, pairs_span, percent, plain, probability, short, span, with_span
 from proxytune.report.writing import ABOUT, picture_of, write_text
 from proxytune.storage import TrialRecord
-from proxytune.study import LEARNING, PRPV, StudyResult, StudySettings
+from proxytune.study import LEARNING, PRPV, Preflight, StudyResult, StudySettings
 from proxytune.usefulness import LEFT_OUT, PAIRED, PERFECT, Estimate
 
 Rows = list[tuple[str, ...]]
@@ -185,8 +185,7 @@ def search_table(result: StudyResult, spent: str = "") -> Table:
         names = ", ".join(result.study.settings.low_fidelity)
         rows.append(("low fidelity", f"{result.low_fidelity} trials of {names}, corrected by this proxy's"))
     if result.preflight is not None:
-        warnings = [line.removeprefix("pre-flight: ") for line in result.preflight.warnings]
-        rows += [("pre-flight", line) for line in warnings or ["every parameter changes some metric beyond noise"]]
+        rows += [("pre-flight", line) for line in _preflight_lines(result, result.preflight)]
     if result.pruned:
         episodes, seconds = result.spared
         trials = f"{len(result.pruned)} trial{'' if len(result.pruned) == 1 else 's'} that could not be the best"
@@ -202,6 +201,15 @@ def search_table(result: StudyResult, spent: str = "") -> Table:
     if spent:
         rows.append(("episodes", spent))
     return Table(SEARCH, columns_of(("", "")), tuple(rows))
+
+
+def _preflight_lines(result: StudyResult, preflight: Preflight) -> list[str]:
+    """What the pre-flight warned of, but for the parameters that trials have identified since."""
+    vague = {*result.knowledge.unidentified, *result.dead}
+    settled = {one.warning for one in preflight.movements if one.pairs and one.interval.name not in vague}
+    warnings = [line.removeprefix("pre-flight: ") for line in preflight.warnings if line not in settled]
+    identified = " or is identified" if any(settled) else ""
+    return warnings or [f"every parameter changes some metric beyond noise{identified}"]
 
 
 def trials_table(trials: Sequence[TrialRecord], names: Sequence[str], measures: Sequence[str] = MEASURES) -> Table:

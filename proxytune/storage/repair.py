@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from proxytune.errors import InputError, StoreError
+from proxytune.files import draft_of
 from proxytune.storage import database
 from proxytune.storage.folder import refuse_links
 from proxytune.storage.store import FILE_NAME
@@ -76,6 +77,7 @@ def _rebuild(path: Path, problem: str) -> Salvage:
             kept = {table: database.counted(whole)[table] for table in KEPT}
             whole.execute("COMMIT")
         aside = _set_aside(path)
+        _take_logs_away(path)
         draft.replace(path)
     except OSError as failure:
         raise StoreError(f"{path}: cannot be replaced ({failure.strerror}); make room, or copy the study") from None
@@ -110,13 +112,30 @@ def _copy(damaged: sqlite3.Connection, whole: sqlite3.Connection) -> dict[str, i
 
 
 def _set_aside(path: Path) -> Path:
-    """Copy the damaged file with its logs of writes, and take the logs away: they belong to no other file."""
+    """Copy the damaged file with its logs of writes, each whole or not at all."""
     names = (f"{path.name}.damaged{number or ''}" for number in range(10_000))
     aside = next(path.with_name(name) for name in names if not path.with_name(name).exists())
-    for ending in ("", "-wal", "-journal"):
-        log = path.with_name(f"{path.name}{ending}")
-        if log.exists():
-            shutil.copyfile(log, aside.with_name(f"{aside.name}{ending}"))
+    for ending in ("-wal", "-journal", ""):
+        file = path.with_name(f"{path.name}{ending}")
+        if file.exists():
+            with draft_of(aside.with_name(f"{aside.name}{ending}")) as draft:
+                shutil.copyfile(file, draft)
+    return aside
+
+
+def _take_logs_away(path: Path) -> None:
+    """Bring the log's writes into the damaged file, which after a kill is thus there as a whole, and remove the logs.
+
+    SQLite would take a log that is left beside another file for that one's.
+    """
+    try:
+        with closing(database.open_file(path, writable=True)) as damaged:
+            busy, *_ = damaged.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchone()
+        if busy:
+            raise StoreError(f"{path}: another program holds it open; close that and run again")
+    except sqlite3.DatabaseError as problem:
+        # What SQLite cannot read at all has given no row either
+        if problem.sqlite_errorcode & 0xFF not in (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB, sqlite3.SQLITE_ERROR):
+            raise
     for ending in ("-wal", "-shm", "-journal"):
         path.with_name(f"{path.name}{ending}").unlink(missing_ok=True)
-    return aside

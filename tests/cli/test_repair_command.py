@@ -2,12 +2,14 @@
 
 import shutil
 import sqlite3
+import sys
+from contextlib import closing
 
 import pytest
-from processes import episodes, trials
+from processes import episodes, finished_episodes, trials
 
 from proxytune.cli.main import main
-from proxytune.storage import Store
+from proxytune.storage import Store, repair
 
 DAMAGES = {
     "a score": ("UPDATE trials SET score = score + 7 WHERE number = 3", 2, 0),
@@ -127,6 +129,42 @@ def test_writes_that_are_still_in_the_log_are_kept_and_the_log_is_set_aside(fini
     assert not (copy / "study.db-wal").exists()
     with Store.read(copy) as store:
         assert store.trials() == before[:6]
+
+
+def test_a_kill_before_any_line_of_a_repair_loses_no_row_that_is_in_the_log_alone(finished, tmp_path):
+    """What lay on the disk before each line, repaired anew."""
+    with closing(sqlite3.connect(finished / "study.db")) as plain:
+        plain.executescript("CREATE TEMP TABLE apart AS SELECT * FROM episodes; PRAGMA journal_mode = WAL")
+        plain.executescript("DELETE FROM episodes; UPDATE counts SET rows = 0 WHERE name = 'episodes'")
+        plain.executescript("PRAGMA wal_checkpoint(TRUNCATE); INSERT INTO episodes SELECT * FROM apart")
+        plain.executescript("UPDATE counts SET rows = 126 WHERE name = 'episodes'; UPDATE trials SET score = 0")
+        shutil.copytree(finished, tmp_path / "damaged")
+    before = sys.gettrace()
+    sys.settrace(copying_before_each_line(repair.__file__, tmp_path / "damaged", tmp_path / "killed"))
+    try:
+        repair.salvage(tmp_path / "damaged")
+    finally:
+        sys.settrace(before)
+    killed = [tmp_path / "damaged", *(tmp_path / "killed").iterdir()]
+    assert len(killed) > 30
+    again = [repair.salvage(folder) is not None for folder in killed]
+    assert True in again
+    assert False in again
+    assert {finished_episodes(folder) for folder in killed} == {126}
+
+
+def copying_before_each_line(code, folder, copies):
+    """A trace that copies a folder before each line of some code, unless it has already with the same files."""
+
+    def trace(frame, event, argument):
+        if frame.f_code.co_filename != code:
+            return None
+        files = sorted(f"{path.name}{path.stat().st_size}" for path in folder.glob("study.db*"))
+        if not (copy := copies / " ".join((str(frame.f_lineno), *files))).exists():
+            shutil.copytree(folder, copy)
+        return trace
+
+    return trace
 
 
 @pytest.mark.slow

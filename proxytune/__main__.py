@@ -5,6 +5,7 @@ all were done (`os._exit(0)`, or `exit(0)` of a simulator in C): until the comma
 another, and one line says so. Nothing can be done about `_exit` called in C.
 """
 
+import atexit
 import contextlib
 import os
 import signal
@@ -24,6 +25,8 @@ def run() -> int:
     """Run the command line; its exit status."""
     _open_descriptors()
     _on_signals(_end_at_once)
+    # Comes last of all that is registered so: thereafter Python heeds no handler, and a signal would be the status
+    atexit.register(_on_signals, signal.SIG_IGN)
     for name in UNSET:
         os.environ.setdefault(name, "")
     if os.path.lexists("matplotlibrc"):
@@ -62,7 +65,7 @@ def _open_descriptors() -> None:
         setattr(sys, name, open(number, mode, encoding="utf-8", closefd=False))  # noqa: SIM115
 
 
-def _on_signals(handler: Callable[[int, FrameType | None], object]) -> None:
+def _on_signals(handler: Callable[[int, FrameType | None], object] | signal.Handlers) -> None:
     """Handle the signals that stop a command; one that is ignored, as after nohup, stays so."""
     for number in STOPPING:
         if signal.getsignal(number) is not signal.SIG_IGN:

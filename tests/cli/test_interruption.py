@@ -117,6 +117,25 @@ def test_a_signal_as_a_command_begins_or_ends_to_hear_of_signals_is_one_line(mom
     assert bool(done.stdout) == (moment > 2)
 
 
+LATE = """
+import os, signal, sys
+from proxytune import __main__
+class Late:
+    def __del__(self, kill=os.kill, process=os.getpid(), number=int(sys.argv.pop())):
+        kill(process, number)
+late = Late()
+raise SystemExit(__main__.run())
+"""
+
+
+@pytest.mark.parametrize("number", STOPPING)
+def test_a_signal_as_python_takes_itself_down_changes_no_status(number):
+    words = [sys.executable, "-c", LATE, "list", "robots", str(int(number))]
+    how = {"capture_output": True, "text": True, "env": ENVIRONMENT, "preexec_fn": heeding_ctrl_c}
+    done = subprocess.run(words, check=False, **how)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
 @pytest.mark.slow
 def test_what_is_ignored_stays_so_as_after_nohup(make_study):
     folder = make_study(domain=SLOWLY, jobs="2", **FEW)

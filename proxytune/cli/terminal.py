@@ -10,6 +10,7 @@ import json
 import os
 import signal
 import sys
+import threading
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, redirect_stdout, suppress
 from dataclasses import dataclass
@@ -36,21 +37,39 @@ class Terminated(Interrupted):
     """SIGTERM, or SIGHUP as its terminal went away, was received; raised in the main thread."""
 
 
+ANEW_S = 0.01
+"""After so long a signal is sent anew [s]."""
+
+
 @contextmanager
 def signals_as_interruptions() -> Iterator[None]:
     """Raise Interrupted at every Ctrl-C and Terminated at the first SIGTERM or SIGHUP.
 
     Later ones of the latter are ignored, so that cleaning up is not interrupted; so is what is ignored already, as
-    Ctrl-C for a command that a script has put into the background, and SIGHUP after nohup.
+    Ctrl-C for a command that a script has put into the background, and SIGHUP after nohup. One that comes within
+    `__del__`, or a function that C calls, out of which Python lets nothing be raised, is sent anew.
     """
     handlers = {signal.SIGTERM: _terminate, signal.SIGHUP: _terminate, signal.SIGINT: interrupt}
     heard = [number for number in handlers if signal.getsignal(number) is not signal.SIG_IGN]
     before = {number: signal.getsignal(number) for number in heard}
+    told = sys.unraisablehook
+
+    def tell(dropped: Any) -> None:
+        if not isinstance(dropped.exc_value, Interrupted):
+            told(dropped)
+            return
+        number = _number_of(dropped.exc_value)
+        signal.signal(number, handlers[number])
+        # Not here, where it would be dropped too
+        threading.Timer(ANEW_S, os.kill, (os.getpid(), number)).start()
+
     try:
+        sys.unraisablehook = tell
         for number in heard:
             signal.signal(number, handlers[number])
         yield
     finally:
+        sys.unraisablehook = told
         for number, handler in before.items():
             signal.signal(number, signal.SIG_DFL if handler is None else handler)
 
@@ -59,6 +78,10 @@ def _terminate(number: int, frame: FrameType | None) -> None:
     for later in (signal.SIGTERM, signal.SIGHUP):
         signal.signal(later, signal.SIG_IGN)
     raise Terminated(number)
+
+
+def _number_of(problem: BaseException) -> signal.Signals:
+    return signal.Signals(problem.args[0]) if isinstance(problem, Terminated) else signal.SIGINT
 
 
 FAILED = 1
@@ -74,7 +97,7 @@ REMEDIES = {
 def stopped_by(problem: KeyboardInterrupt | SystemExit | MemoryError | OSError) -> tuple[str, int]:
     """Say what stopped a command, in one phrase, and its exit status."""
     if is_users(problem):
-        number = problem.args[0] if isinstance(problem, Terminated) else signal.SIGINT
+        number = _number_of(problem)
         return STOPPING[number], 128 + number
     if isinstance(problem, MemoryError):
         return f"memory ran out ({describe(problem)}); ask for less", FAILED

@@ -6,6 +6,7 @@ import pty
 import signal
 import subprocess
 import sys
+import time
 from contextlib import nullcontext
 
 import pytest
@@ -66,6 +67,19 @@ def kept_handler():
     before = signal.getsignal(signal.SIGINT)
     yield
     signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.parametrize("number", STOPPING)
+def test_a_signal_that_comes_where_python_drops_what_is_raised_is_raised_after_that(number, kept_handler, capsys):
+    class Dropped:
+        def __del__(self):
+            os.kill(os.getpid(), number)
+
+    with pytest.raises(Interrupted) as raised, signals_as_interruptions():
+        Dropped()
+        time.sleep(9)
+    assert isinstance(raised.value, Terminated) == (number != signal.SIGINT)
+    assert capsys.readouterr().err == ""
 
 
 @pytest.mark.parametrize("number", STOPPING)

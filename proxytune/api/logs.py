@@ -80,8 +80,8 @@ def record_log(
     write_text(folder / "samples.csv", samples_text(log))
     if log.frames:
         write_text(folder / "frames.csv", frames_text(log, log.frames, range(len(log.frames.paths)), "%.6f"))
-    write_text(folder / "log.toml", log_text(log, f"{model.name} on the {family.plant} plant, driven by proxytune"))
     found = (*cautions_of(family), *log_cautions(log, read_robot(family.robot, family.folder).figures))
+    write_text(folder / "log.toml", log_text(log, f"{model.name} on the {family.plant} plant, driven by proxytune"))
     return log, tuple(dict.fromkeys(found))
 
 

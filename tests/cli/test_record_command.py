@@ -5,6 +5,7 @@ import pytest
 
 from proxytune.cli.main import main
 from proxytune.diagnosis import recording as filming
+from proxytune.extensions import interrupt
 from proxytune.files import shipped
 from proxytune.logs import read_log, read_pictures
 from proxytune.study import load_family, read_study_settings
@@ -74,6 +75,13 @@ def test_manoeuvres_are_the_same_with_frames_and_odd_intervals_a_caution(words, 
     (tmp_path / "model.toml").write_text(MODEL + "[effects.trim]\ntrim = { value = 0.2, interval = [0.01, 0.05] }\n")
     assert main([*map(str, words("odd"))]) == 0
     assert capsys.readouterr().out.startswith("beware: ")
+
+
+def test_a_signal_after_the_drives_leaves_no_log_and_the_same_command_writes_it(words, refused, answered, monkeypatch):
+    with monkeypatch.context() as patch:
+        patch.setattr("proxytune.api.logs.log_cautions", lambda *known: interrupt(2, None))
+        assert "no log was written" in refused(*words("log"), status=130)
+    assert answered(*words("log"))["rows"]
 
 
 @pytest.mark.slow

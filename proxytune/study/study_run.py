@@ -7,6 +7,7 @@ composed (`compose_of`). `measure_agents` scores the agents in one fixed domain:
 """
 
 import itertools
+import sys
 from collections import Counter
 from collections.abc import Callable, Collection, Hashable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -297,12 +298,10 @@ class StudyRun:
         try:
             apart = kept_apart(store, self.settings, self.study.family, self.study.code, needed, watch)
             yield replace(watch, alone=apart | store.agents_that_failed(RAISED))
-        except GeneratorExit:  # What Ctrl-C left open ends when the store is closed
-            raise
-        except BaseException:
-            store.begin_episode(identity)
-            raise
-        store.begin_episode(identity)
+        finally:
+            # What Ctrl-C left open ends when the store is closed.
+            if not isinstance(sys.exception(), GeneratorExit):
+                store.begin_episode(identity)
 
     def _keep(self, outcomes: Sequence[Outcome]) -> None:
         """Keep the outcomes of a fleet; what took too long for the first time is tried again by the next run."""

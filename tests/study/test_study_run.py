@@ -375,3 +375,16 @@ def test_one_trial_is_spent_as_one():
     run = SimpleNamespace(settings=SimpleNamespace(budget=1, stop=None))
     assert stopped(run, [None]) == "the budget of 1 trial is spent"
     assert stopped(run, [None, None]) == "the budget of 1 trial is spent; all 2 that are finished count"
+
+
+def test_what_watches_episodes_writes_as_it_ends_and_nothing_where_python_ends_what_was_left_open(make_study):
+    with running(make_study()) as study_run:
+        episode = study_run.episodes_of(TrialRecord(1, {"trim": 0.1, "delay": 0.2}))[0]
+        study_run.store.begin_episode(study_run.study.identity, episode)
+        left = study_run.watched()
+        left.__enter__()
+        del left
+        assert study_run.store.under_way(study_run.study.identity) == [episode]
+        with study_run.watched():
+            pass
+        assert study_run.store.under_way(study_run.study.identity) == []

@@ -11,6 +11,7 @@ blocks give the `intervals` (sandwich; jackknife where there is no slope). `chec
 that cannot bear the question: no motion, or other units and axes than the commands'.
 """
 
+import functools
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -26,11 +27,11 @@ from proxytune.diagnosis.motion.innovations import (
     Noise,
     Whitener,
     clip_outliers,
+    difference_quotient,
     fit_noise,
     huber,
     increments,
     is_stepwise,
-    nudged,
     smooth_coordinates,
     span,
     spans,
@@ -129,15 +130,13 @@ def slopes(drives: Drives, theta: Theta, free: tuple[Coordinate, ...], whiten: W
     """Differentiate the innovations by each coordinate, as a fraction of its range (3N, coordinates)."""
     if not free:
         return np.empty((3 * len(drives.episode), 0))
-    here = increments(drives, theta)
-    columns = []
+    columns, predicted = [], functools.partial(increments, drives)
     for coordinate in free:
         if is_stepwise(coordinate, drives.robot):
             # The slope there says nothing of the next step.
-            columns.append(np.zeros_like(here))
+            columns.append(np.zeros_like(drives.measured))
             continue
-        there, step = nudged(drives, theta, coordinate, STEP)
-        columns.append((here - increments(drives, there)) / step)
+        columns.append(-difference_quotient(predicted, drives, theta, coordinate, STEP))
     return whiten.whiten(np.stack(columns, axis=-1))
 
 

@@ -18,6 +18,7 @@ from proxytune.diagnosis.motion.drives import SEVERAL, Drives, Floats, Recent
 from proxytune.diagnosis.motion.fitting import STEP, Fit, evaluate, sandwich_intervals
 from proxytune.diagnosis.motion.innovations import (
     Coordinate,
+    difference_quotient,
     increments,
     smooth_coordinates,
     spans,
@@ -113,22 +114,20 @@ def _problem(drives: Drives, theta: Theta, free: tuple[Coordinate, ...], windows
     def at(fractions: Floats) -> dict[str, float]:
         return theta_at(theta, free, low + fractions * (high - low))
 
-    def residuals(fractions: Floats) -> Floats:
+    def misses(values: Theta) -> Floats:
         def make() -> Floats:
-            misses = np.asarray(((predicted_motion(drives, at(fractions), windows) - measured) * weights).ravel())
-            misses.setflags(write=False)
-            return misses
+            made = np.asarray(((predicted_motion(drives, values, windows) - measured) * weights).ravel())
+            made.setflags(write=False)
+            return made
 
-        return recent.get(fractions.tobytes(), make)
+        return recent.get(tuple(values.items()), make)
+
+    def residuals(fractions: Floats) -> Floats:
+        return misses(at(fractions))
 
     def jacobian(fractions: Floats) -> Floats:
-        here, columns = residuals(fractions), []
-        for number in range(len(fractions)):
-            step = STEP if fractions[number] + STEP <= 1.0 else -STEP
-            moved = fractions.copy()
-            moved[number] += step
-            columns.append((residuals(moved) - here) / step)
-        return np.stack(columns, axis=1)
+        here = at(fractions)
+        return np.stack([difference_quotient(misses, drives, here, one, STEP) for one in free], axis=1)
 
     start = np.clip((values_at(theta, free) - low) / (high - low), 1e-6, 1.0 - 1e-6)
     return _Problem(at, residuals, jacobian, start, max(1e-6, ROBUST * float(np.median(np.abs(residuals(start))))))

@@ -20,6 +20,7 @@ from proxytune.diagnosis.motion import innovations
 from proxytune.diagnosis.motion.drives import (
     Drives,
     Floats,
+    Recent,
     Whole,
     as_measured,
     cosine_and_sine,
@@ -393,9 +394,15 @@ def slopes_of(drives: Drives, theta: Theta, offered: Learnt, free: Sequence[inno
     x = cosine * changes[:, 0] - sine * changes[:, 1]
     y = sine * changes[:, 0] + cosine * changes[:, 1]
     columns, scale = [np.stack((x, y, way * changes[:, 2]), axis=1)], (1.0, 1.0, way)
+    known = Recent[Floats]()
+    known.get(tuple(theta.items()), lambda: predicted)
+
+    def motion_at(values: Theta) -> Floats:
+        return known.get(tuple(values.items()), lambda: walk(values)[2])
+
     for coordinate in free:
-        there, step = innovations.nudged(drives, theta, coordinate, STEP)
-        columns.append(((walk(there)[2] - predicted) * scale / step)[..., None])
+        slope = innovations.difference_quotient(motion_at, drives, theta, coordinate, STEP)
+        columns.append((slope * scale)[..., None])
     return Slopes((measured - predicted) * scale, np.concatenate(columns, axis=2), drives.block[begin[window]])
 
 

@@ -36,6 +36,15 @@ def test_trim_delay_and_noise_are_found_in_narrow_intervals_and_nothing_free_lea
     assert fit(drives, TRUTH, ()).theta == TRUTH
 
 
+@pytest.mark.parametrize("start", [0.08, 0.2, 0.28, 0.34])
+def test_a_delay_is_found_from_afar_past_the_kinks_that_its_loss_has_at_every_tick(start):
+    truth, free = {**TRUTH, "slew_rate": 1.6}, (*DECLARED, ("slew_rate",))
+    found = fit(planted_drives(truth, episodes=8), {**truth, "delay": start}, free)
+    assert found.theta["delay"] == pytest.approx(TRUTH["delay"], abs=0.005)
+    low, high = intervals(found)["delay"]
+    assert low < TRUTH["delay"] < high and high - low < 0.015
+
+
 @pytest.mark.slow
 def test_intervals_cover_the_truth_most_of_the_time():
     covered = []

@@ -223,7 +223,7 @@ HIDDEN = [
 @pytest.mark.slow
 @pytest.mark.parametrize("name", HIDDEN)
 def test_a_hidden_effect_is_the_first_to_be_added(name):
-    base = fitted(drives_of(hidden.make_log(CASES[name], episodes=6, seconds=15.0)))
+    base = fitted(drives_of(hidden.make_log(CASES[name], episodes=6, seconds=30.0)))
     evidence = gather_evidence(base, {"trim", "delay"}, 1)
     (added,) = adopt([], choose_best(base, evidence, RULES.least_gain_nats), evidence)
     (right,) = CASES[name].right

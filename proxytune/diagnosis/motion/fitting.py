@@ -17,8 +17,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import least_squares
+from scipy.stats import t as student
 
-from proxytune.arrays import NORMAL_95
 from proxytune.diagnosis.motion.drives import Drives, Floats, Whole, sum_by
 from proxytune.diagnosis.motion.innovations import (
     FIRST_GUESS,
@@ -217,10 +217,11 @@ def sandwich_intervals(
     ends = [drives.rules.at_end(value, own) for value, own in zip(values_at(theta, free), ranges, strict=True)]
     inside, spread = np.flatnonzero(~np.array(ends, dtype=bool)), variances(np.arange(len(free)))
     spread[inside] = variances(inside)
-    spread *= len(gradients) / max(1, len(gradients) - len(free))
+    freedom = max(1, len(gradients) - len(free))
+    spread *= len(gradients) / freedom
     found: dict[str, tuple[float, float]] = {}
     for coordinate, (low, high), variance in zip(free, ranges, spread, strict=True):
-        half = NORMAL_95 * float(np.sqrt(variance)) * (high - low)
+        half = float(student.ppf(0.975, freedom) * np.sqrt(variance)) * (high - low)
         found |= {name: (max(low, theta[name] - half), min(high, theta[name] + half)) for name in coordinate}
     return found
 

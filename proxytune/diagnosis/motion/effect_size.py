@@ -74,6 +74,11 @@ def drop_negligible(found: Findings, seed: int, aside: Drives | None = None) -> 
         dropped.append(DroppedEffect(weakest.effect, variant, weakest.harmful))
         variant = without_effect(variant, weakest.effect, drives.rate_hz)
         kept.remove(weakest.effect)
+        if not weakest.effect.free:
+            # A delay that was needless beside its draws has their lateness back, and is weighed with that.
+            back = [one.effect for one in dropped if one.effect.effect == "delay"]
+            dropped, kept = [one for one in dropped if one.effect not in back], kept + back
+            variant = variant._replace(free=variant.free + tuple(own for one in back for own in one.free))
     if not dropped:
         return found
     model = fit(drives, variant.theta, variant.free, found.model.noise)

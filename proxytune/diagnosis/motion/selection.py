@@ -387,9 +387,11 @@ def _rivals(best: FittedCandidate, chosen: ScreenedCandidate, evidence: Evidence
 
 def drop_idle(model: Fit, adopted: Sequence[AdoptedEffect]) -> tuple[Fit, list[AdoptedEffect]]:
     """Drop the first effect that no longer pays beside the one adopted last; at most one a round."""
-    # Random effects stay: they move no mean, so the likelihood of the mean cannot speak for them.
+    # Random effects stay: they move no mean, so the likelihood of the mean cannot speak for them. The delay, which has
+    # given them its lateness, stays to take it back.
+    draws = any(not effect.free for effect in adopted)
     for effect in adopted[:-1]:
-        if effect.free and len(adopted) > 1:
+        if effect.free and len(adopted) > 1 and not (draws and effect.effect == "delay"):
             without = _fit_without(effect, model)
             if _gain(model, without) < model.drives.rules.least_gain_nats:
                 return without, [other for other in adopted if other is not effect]

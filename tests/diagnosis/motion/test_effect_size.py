@@ -127,6 +127,25 @@ def test_worth_is_told_on_drives_that_were_not_fitted(drives):
     assert all(one.interval[0] < RULES.material_factor and one.value < 1.2 for one in little.values())
 
 
+def test_a_delay_that_draws_made_needless_is_weighed_anew_where_they_are_dropped(monkeypatch):
+    late, draws = adopted("delay", (("delay",),)), adopted("delay_jitter", names=("delay_jitter",))
+    theta, free = {"trim": TRUTH["trim"], "delay": 0.0, "delay_jitter": 0.24}, (("trim",), ("delay",))
+    drives = planted_drives(TRUTH, episodes=6, seconds=20.0)
+    plain = evaluate(drives, {"trim": TRUTH["trim"]}, free[:1], NOISE)
+
+    def sizes(_model, _tested, variant, effects, _seed):
+        drawn = "delay_jitter" in variant.theta
+        needed = {"delay": not drawn, "delay_jitter": drawn and ("delay",) in variant.free}
+        return [{2.0: Ratio(1.5, (1.4, 1.6)) if needed[one.effect] else Ratio(1.0, (0.9, 1.1))} for one in effects]
+
+    monkeypatch.setattr(likeness, "measure_effect_sizes", sizes)
+    weighed = drop_negligible(Findings(plain, evaluate(drives, theta, free, NOISE), (late, draws), (), (), ()), 1)
+    assert weighed.adopted == (late,)
+    assert [dropped.effect for dropped in weighed.negligible] == [draws]
+    assert weighed.model.free == free
+    assert weighed.model.theta["delay"] == pytest.approx(TRUTH["delay"], abs=0.005)
+
+
 @pytest.mark.parametrize(("size", "matters"), [(0.4, True), (0.02, False)])
 def test_a_random_effect_matters_if_its_draws_make_up_the_error(size, matters):
     calm = planted_drives(TRUTH, episodes=6, seconds=20.0)

@@ -90,6 +90,17 @@ def test_an_effect_that_does_nothing_beside_the_last_one_is_dropped_and_one_that
     assert model.theta["yaw_scrub"] == pytest.approx(0.13, abs=0.005)
 
 
+@pytest.mark.parametrize("size", [0.0, 0.1])
+def test_an_idle_delay_stays_only_beside_draws_whose_lateness_it_has_to_take_back(size):
+    usual = ROBOT.theta["delay"]
+    drives = planted_drives({"trim": 0.03, "delay": usual + size / 2.0}, episodes=4, seconds=12.0)
+    late, draws, last = adopted_with("delay"), replace(adopted_with("delay_jitter"), free=()), adopted_with("turn_slip")
+    theta = {"trim": 0.03, "delay": usual, "turn_slip": 0.0, **({"delay_jitter": size} if size else {})}
+    model = fit(drives, theta, (("trim",), *late.free, *last.free))
+    _, kept = drop_idle(model, [late, draws, last] if size else [late, last])
+    assert (late in kept) == bool(size)
+
+
 RESISTED = "inertia (turning is resisted by speed)"
 
 

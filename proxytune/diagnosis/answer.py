@@ -56,6 +56,10 @@ class Rules:
     least_random_gain_nats: float = 30.0
     """Evidence that a random effect needs: twice as much, for its chance is drawn from shifted innovations, roughly."""
 
+    least_spread_ticks: float = 2.0
+    """Commands must be late by times that differ by more ticks of the model: it has a command begin with a tick, and a
+    robot without jitter whose motors take 1.6 s to full speed seems to have one of up to 1.9."""
+
     most_left_of_commands: float = 2.5
     """What a random effect of a car may leave of its commands' pulls [standard deviations]. Planted losses and jitter
     leave 0.4 to 1.7; what else the model lacks pulls both ways, early and late, and much remains: 4 to 6 on DART."""

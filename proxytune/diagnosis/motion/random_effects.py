@@ -62,6 +62,10 @@ class RandomEffect(NamedTuple):
     # what the likeliest lateness of every command leaves of its pull on the innovations: about 1 if lateness is all
     left: float = 0.0
 
+    def spread_s(self, rate_hz: float) -> float:
+        """How far apart the times lie by which it makes commands late, of so many a second [s]."""
+        return float(np.ptp(RANDOM_EFFECTS[self.effect].lateness(self.value, rate_hz).commands)) / rate_hz
+
 
 def random_effects(fitted: Fit, seed: int) -> tuple[RandomEffect, ...]:
     """Weigh every effect that draws on what the model leaves over."""

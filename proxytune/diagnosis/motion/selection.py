@@ -252,7 +252,14 @@ def choose_best(model: Fit, evidence: Evidence, least: float, p_value: float | N
     rare = [effect for effect in evidence.random if effect.p_value <= rules.p_value]
     # A car's motion is hidden by much else at first, which pulls commands early as well as late.
     most_left = rules.most_left_of_commands if model.drives.robot.drive == "ackermann" else math.inf
-    clear = [effect for effect in rare if effect.gain >= rules.least_random_gain_nats and effect.left <= most_left]
+    least_s = rules.least_spread_ticks / model.drives.tick_hz
+    clear = [
+        effect
+        for effect in rare
+        if effect.gain >= rules.least_random_gain_nats
+        and effect.left <= most_left
+        and effect.spread_s(model.drives.rate_hz) > least_s
+    ]
     everything: list[FittedCandidate | RandomEffect] = [*named, *clear]
     ranked = sorted(everything, key=lambda one: -one.gain)
     # Generators: a random effect costs a fit, which is made only once its turn comes.

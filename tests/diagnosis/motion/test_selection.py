@@ -147,6 +147,16 @@ def test_a_random_effect_needs_as_small_a_chance_and_twice_the_evidence(drives, 
     assert chosen(drives, random=(RandomEffect("dropped_commands", 0.1, (0.05, 0.2), gain, p_value),)) is None
 
 
+@pytest.mark.parametrize(("spread", "wanted"), [(0.03, False), (0.05, True)])
+def test_a_jitter_within_two_ticks_of_the_model_is_not_told(drives, spread, wanted, monkeypatch):
+    monkeypatch.setattr(
+        selection, "fit_random", lambda model, effect: FittedCandidate(effect.gain, model, None, effect)
+    )
+    jitter = RandomEffect("delay_jitter", spread, (0.02, 0.06), 500.0, 0.002)
+    best = choose_best(evaluate(drives, TRUTH, DECLARED, NOISE), Evidence([], {}, (jitter,), []), 15.0)
+    assert (best is not None and best.random is jitter) == wanted
+
+
 @pytest.mark.parametrize(("gain", "wanted"), [(85.0, "dead_band"), (40.0, "dead_band (left wheel)")])
 def test_a_form_for_both_wheels_is_preferred_to_one_for_a_single_wheel_at_little_loss(drives, gain, wanted):
     one = ("dead_band (left wheel)", {"dead_band.width": 0.001, "dead_band.imbalance": 0.001}, 90.0)
@@ -332,7 +342,8 @@ def test_an_effect_is_listed_by_its_full_fit_where_it_has_one_and_random_effects
 def test_no_random_effect_stands_for_what_a_car_lacks_beside_it(monkeypatch, drive, left, chosen):
     """True ones leave up to 1.7 of what pulls commands. Robots on two wheels are judged as they always were."""
     lost = RandomEffect("dropped_commands", 0.5, (0.0, 0.6), 2000.0, 0.01, left)
-    model = SimpleNamespace(drives=SimpleNamespace(rules=RULES, robot=SimpleNamespace(drive=drive)))
+    driven = SimpleNamespace(rules=RULES, robot=SimpleNamespace(drive=drive), rate_hz=20.0, tick_hz=60.0)
+    model = SimpleNamespace(drives=driven)
     monkeypatch.setattr(selection, "fit_random", lambda model, one: FittedCandidate(one.gain, model, random=one))
     monkeypatch.setattr(selection, "predicts_no_worse", lambda one, other: True)
     assert (choose_best(model, Evidence([], {}, (lost,), []), 15.0) is not None) == chosen

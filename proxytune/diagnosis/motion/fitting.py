@@ -14,6 +14,7 @@ that cannot bear the question: no motion, or other units and axes than the comma
 import functools
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -31,6 +32,7 @@ from proxytune.diagnosis.motion.innovations import (
     fit_noise,
     huber,
     increments,
+    is_lateness,
     is_stepwise,
     smooth_coordinates,
     span,
@@ -100,12 +102,19 @@ def _fit_sloped(drives: Drives, theta: Theta, free: tuple[Coordinate, ...], whit
         moved = theta_at(theta, free, low + fractions * (high - low))
         return whiten.whiten(drives.measured - increments(drives, moved))
 
-    def jacobian(fractions: Floats) -> Floats:
-        return slopes(drives, theta_at(theta, free, low + fractions * (high - low)), free, whiten)
+    def jacobian(fractions: Floats, *, across_ticks: bool = False) -> Floats:
+        moved = theta_at(theta, free, low + fractions * (high - low))
+        return slopes(drives, moved, free, whiten, across_ticks=across_ticks)
 
-    start = np.clip((values_at(theta, free) - low) / (high - low), 1e-6, 1.0 - 1e-6)
-    found = least_squares(residuals, start, jacobian, (0.0, 1.0), loss="huber", f_scale=HUBER, ftol=1e-7, max_nfev=30)
-    return theta_at(theta, free, low + np.clip(found.x, 0.0, 1.0) * (high - low))
+    # A search by the slope at a delay ends in the nearest kink, far from its best value: one across ticks comes first.
+    late = any(is_lateness(coordinate, drives.robot) for coordinate in free)
+    known: dict[str, Any] = {"bounds": (0.0, 1.0), "loss": "huber", "f_scale": HUBER, "ftol": 1e-7, "max_nfev": 30}
+    best = (values_at(theta, free) - low) / (high - low)
+    for across_ticks in (True, False) if late else (False,):
+        start = np.clip(best, 1e-6, 1.0 - 1e-6)
+        slope = functools.partial(jacobian, across_ticks=across_ticks)
+        best = least_squares(residuals, start, slope, **known).x
+    return theta_at(theta, free, low + np.clip(best, 0.0, 1.0) * (high - low))
 
 
 def _scan(drives: Drives, theta: Theta, rough: tuple[Coordinate, ...], whiten: Whitener, multiples: Floats) -> Theta:
@@ -126,7 +135,9 @@ def loss_of(drives: Drives, theta: Theta, whiten: Whitener) -> float:
     return float(huber(whiten.whiten(drives.measured - increments(drives, theta))).sum())
 
 
-def slopes(drives: Drives, theta: Theta, free: tuple[Coordinate, ...], whiten: Whitener) -> Floats:
+def slopes(
+    drives: Drives, theta: Theta, free: tuple[Coordinate, ...], whiten: Whitener, *, across_ticks: bool = False
+) -> Floats:
     """Differentiate the innovations by each coordinate, as a fraction of its range (3N, coordinates)."""
     if not free:
         return np.empty((3 * len(drives.episode), 0))
@@ -136,7 +147,8 @@ def slopes(drives: Drives, theta: Theta, free: tuple[Coordinate, ...], whiten: W
             # The slope there says nothing of the next step.
             columns.append(np.zeros_like(drives.measured))
             continue
-        columns.append(-difference_quotient(predicted, drives, theta, coordinate, STEP))
+        slope = difference_quotient(predicted, drives, theta, coordinate, STEP, across_ticks=across_ticks)
+        columns.append(-slope)
     return whiten.whiten(np.stack(columns, axis=-1))
 
 
@@ -179,7 +191,9 @@ LEAST = 0.003
 
 def intervals(fitted: Fit) -> dict[str, tuple[float, float]]:
     """Give 95 % intervals of the fitted parameters, from the scatter between blocks."""
-    gradients, hessian = derivatives_by_block(fitted, fitted.slopes)
+    # A delay's best value is at a kink as a rule, where the slope says nothing of how far off it may be.
+    across = slopes(fitted.drives, fitted.theta, fitted.free, fitted.whiten, across_ticks=True)
+    gradients, hessian = derivatives_by_block(fitted, across)
     known = sandwich_intervals(fitted.theta, fitted.free, fitted.drives, gradients, hessian.sum(axis=0))
     for coordinate in fitted.free:
         if is_stepwise(coordinate, fitted.drives.robot):

@@ -475,15 +475,21 @@ def theta_at(theta: Theta, free: Sequence[Coordinate], values: Sequence[float] |
 
 
 def difference_quotient(
-    function: Callable[[Theta], Floats], drives: Drives, theta: Theta, coordinate: Coordinate, share: float
+    function: Callable[[Theta], Floats],
+    drives: Drives,
+    theta: Theta,
+    coordinate: Coordinate,
+    share: float,
+    *,
+    across_ticks: bool = False,
 ) -> Floats:
     """Differentiate a function of θ by a coordinate, as a fraction of its range, of which it is moved by a `share`.
 
-    Times by which commands are late are moved by a tick either way. The loss has a kink in them at every tick: a search
-    by narrower slopes ends in one of these, far from its best value.
+    The loss has a kink at every tick in times by which commands are late: the slope `across_ticks` is that over one
+    either way.
     """
     here, (low, high) = theta[coordinate[0]], span(coordinate, drives)
-    if _is_lateness(coordinate, drives.robot):
+    if across_ticks and is_lateness(coordinate, drives.robot):
         below, above = max(low, here - 1.0 / drives.tick_hz), min(high, here + 1.0 / drives.tick_hz)
     else:
         # Downwards where the range ends: a function may remember what it gave at θ itself.
@@ -493,7 +499,8 @@ def difference_quotient(
     return (function(upper) - function(lower)) * ((high - low) / (above - below))
 
 
-def _is_lateness(coordinate: Coordinate, robot: Robot) -> bool:
+def is_lateness(coordinate: Coordinate, robot: Robot) -> bool:
+    """Tell whether a coordinate is a time by which commands are late."""
     effect, parameter = robot.catalogue.effect(effect_of(coordinate[0])), robot.catalogue.parameters[coordinate[0]]
     return effect.stage is Stage.COMMAND and parameter.unit == "s"
 

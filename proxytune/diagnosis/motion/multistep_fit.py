@@ -100,7 +100,7 @@ class _Problem(NamedTuple):
 
     at: Callable[[Floats], dict[str, float]]
     residuals: Callable[[Floats], Floats]
-    jacobian: Callable[[Floats], Floats]
+    jacobian: Callable[..., Floats]
     start: Floats
     scale: float
 
@@ -125,9 +125,10 @@ def _problem(drives: Drives, theta: Theta, free: tuple[Coordinate, ...], windows
     def residuals(fractions: Floats) -> Floats:
         return misses(at(fractions))
 
-    def jacobian(fractions: Floats) -> Floats:
+    def jacobian(fractions: Floats, *, across_ticks: bool = False) -> Floats:
         here = at(fractions)
-        return np.stack([difference_quotient(misses, drives, here, one, STEP) for one in free], axis=1)
+        columns = (difference_quotient(misses, drives, here, one, STEP, across_ticks=across_ticks) for one in free)
+        return np.stack(list(columns), axis=1)
 
     start = np.clip((values_at(theta, free) - low) / (high - low), 1e-6, 1.0 - 1e-6)
     return _Problem(at, residuals, jacobian, start, max(1e-6, ROBUST * float(np.median(np.abs(residuals(start))))))
@@ -177,7 +178,7 @@ def fit_multistep(fitted: Fit) -> tuple[Fit, MultistepFit | None]:
     free = smooth_coordinates(fitted.free, drives.robot)
     problem = _problem(drives, theta, free, windows)
     here = problem.start
-    left, slopes, scale = problem.residuals(here), problem.jacobian(here), problem.scale
+    left, slopes, scale = problem.residuals(here), problem.jacobian(here, across_ticks=True), problem.scale
     gradient = slopes * (left / np.sqrt(1.0 + (left / scale) ** 2))[:, None]
     hessian = (slopes / (1.0 + (left / scale) ** 2)[:, None] ** 1.5).T @ slopes
     _, block = np.unique(np.repeat(blocks_of(drives, windows), 3), return_inverse=True)

@@ -84,7 +84,8 @@ def _size(estimate: Mapping[str, Any]) -> str:
     (low, high), unit = estimate["interval"], "" if estimate["unit"] == "duty" else f" {estimate['unit']}".rstrip()
     if low is None or high is None or not low < high:
         return f"{short(estimate['value'])}{unit}"
-    places = max(0, digits((low, high)) - 1)
+    # One figure of half its width: of an interval just wider than a power of ten, one of the whole would be all of it.
+    places = max(0, digits((low, (low + high) / 2.0)) - 1)
     return f"{fixed(estimate['value'], places)}{unit} ({span((low, high), places)})"
 
 

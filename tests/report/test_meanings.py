@@ -69,6 +69,8 @@ def test_what_was_found_or_declared_is_told_with_name_meaning_size_and_worth_and
     assert fitted(("trim", "delay"), {"delay": delay, "trim": trim}) == (
         ", with trim 0.043 (0.042 to 0.045) and delay 0.12 s (0.10 to 0.14)"
     )
+    wide = Estimate(0.0249, (-0.0259, 0.0757), "")
+    assert fitted(("trim",), {"trim": wide}) == ", with trim 0.02 (−0.03 to 0.08)"
     assert fitted(("trim", "motor_lag.imbalance"), {"motor_lag.imbalance": trim}) == ""
     assert fitted(("my_lab:Wheel.first_turn",), {"my_lab:Wheel.first_turn": delay}) == (
         ", with my_lab:Wheel.first_turn 0.12 s (0.10 to 0.14)"

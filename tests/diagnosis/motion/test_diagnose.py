@@ -171,7 +171,7 @@ def test_clocks_that_seem_to_jump_are_read_again_beside_a_slow_motor_and_its_nam
     told: list[str] = []
     log = planted_log({**TRUTH, "slew_rate": 1.6}, episodes=12, seconds=40.0)
     found = diagnose(log, ROBOT, ("trim", "delay"), report=told.append)
-    assert sum("read again beside this model" in step for step in told) == 1
+    assert sum("read again beside this model" in step for step in told) >= 1
     assert [one.effect for one in found.effects] == ["slew_rate"]
     assert not found.clocks[0].differ
 

@@ -8,7 +8,7 @@ model could have: from what the noise of measured poses alone makes, to the lowe
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -231,6 +231,10 @@ class Diagnosis:
         return self.found.model.noise
 
 
+_OnOneClock = tuple[Log, Log | None, tuple[Clocks, ...]]
+"""A log and one to test on, if there is one, on one clock, and what their clocks were."""
+
+
 @one_thread()
 def diagnose(
     log: Log,
@@ -243,12 +247,12 @@ def diagnose(
     rules: Rules = RULES,
     limits: Limits = LIMITS,
     folder: Path | None = None,
-    by_model: Theta | None = None,
+    read: _OnOneClock | None = None,
 ) -> Diagnosis:
     """Tune what is declared, find what is missing, and test both on drives kept aside, as `diagnose_log` says it.
 
-    Clocks are read by the motion of a robot of first order, or `by_model` that of this θ, and again beside that of the
-    named effects: while fewer drives have another clock then, all is done once more.
+    Clocks are read by the motion of a robot of first order, and again beside that of the named effects: while fewer
+    drives have another clock then, all is done once more with what was `read` so.
 
     Raises:
         LogError: If the log cannot bear the question (too short, no motion, other units), or a declared effect is
@@ -257,7 +261,7 @@ def diagnose(
     declared, given = tuple(declared), (log, test)
     names, parameters = declared_parameters(declared, robot.catalogue), robot.catalogue.parameters
     start = {name: robot.theta.get(name, parameters[name].neutral_value(robot.figures)) for name in names}
-    log, test, clocks = _on_one_clock(*given, robot, by_model)
+    log, test, clocks = read or _on_one_clock(*given, robot)
     # An offset of clocks and a delay are one number: where an offset is taken out, the delay is fitted in any case.
     if any(one.offset.value for one in clocks) and "delay" not in names:
         names, start = (*names, "delay"), {**start, "delay": clocks[0].assumed_delay_s}
@@ -273,13 +277,22 @@ def diagnose(
     declared_alone = keep("declared", lambda: fit_declared(parts.fitted, start, names))
     selected = keep("selected", lambda: select_effects(declared_alone, seed, report))
     if any(one.odd or one.drift.value for one in clocks):
-        theta = dict(selected.model.theta)
-        _, _, again = _on_one_clock(*given, robot, theta)
+        again = _on_one_clock(*given, robot, selected.model.theta)
         # A model that was fitted to drives on wrong clocks may still move as if others were.
-        if _count_odd(again) < _count_odd(clocks):
+        if _count_odd(again[2]) < _count_odd(clocks):
             report("clocks are read again beside this model, which moves as if they jumped or drifted")
-            how: Any = {"seed": seed, "report": report, "rules": rules, "limits": limits, "folder": folder}
-            return diagnose(given[0], robot, declared, test=given[1], by_model=theta, **how)
+            return diagnose(
+                given[0],
+                robot,
+                declared,
+                test=given[1],
+                seed=seed,
+                report=report,
+                rules=rules,
+                limits=limits,
+                folder=folder,
+                read=again,
+            )
     named = keep("worth", lambda: effect_size.drop_negligible(selected, seed, parts.tested))
     report("fitting to windows of prediction")
     declared_fit, before = keep("declared_windows", lambda: multistep_fit.fit_multistep(named.declared))
@@ -348,9 +361,7 @@ def diagnose(
     )
 
 
-def _on_one_clock(
-    log: Log, test: Log | None, robot: Robot, model: Theta | None = None
-) -> tuple[Log, Log | None, tuple[Clocks, ...]]:
+def _on_one_clock(log: Log, test: Log | None, robot: Robot, model: Theta | None = None) -> _OnOneClock:
     log, own = on_one_clock(log, robot, model=model)
     if test is None:
         return log, None, (own,)

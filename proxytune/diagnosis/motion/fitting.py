@@ -14,7 +14,6 @@ that cannot bear the question: no motion, or other units and axes than the comma
 import functools
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -108,12 +107,19 @@ def _fit_sloped(drives: Drives, theta: Theta, free: tuple[Coordinate, ...], whit
 
     # A search by the slope at a delay ends in the nearest kink, far from its best value: one across ticks comes first.
     late = any(is_lateness(coordinate, drives.robot) for coordinate in free)
-    known: dict[str, Any] = {"bounds": (0.0, 1.0), "loss": "huber", "f_scale": HUBER, "ftol": 1e-7, "max_nfev": 30}
     best = (values_at(theta, free) - low) / (high - low)
     for across_ticks in (True, False) if late else (False,):
         start = np.clip(best, 1e-6, 1.0 - 1e-6)
-        slope = functools.partial(jacobian, across_ticks=across_ticks)
-        best = least_squares(residuals, start, slope, **known).x
+        best = least_squares(
+            residuals,
+            start,
+            functools.partial(jacobian, across_ticks=across_ticks),
+            (0.0, 1.0),
+            loss="huber",
+            f_scale=HUBER,
+            ftol=1e-7,
+            max_nfev=30,
+        ).x
     return theta_at(theta, free, low + np.clip(best, 0.0, 1.0) * (high - low))
 
 

@@ -326,6 +326,11 @@ def low_pass(signal: Signal, state: LowPassState) -> tuple[Signal, LowPassState]
     return mean, LowPassState(ends[..., -1, :], remainder, mean_remainder)
 
 
+def starts_of(signal: Signal, mean: Signal, state: LowPassState) -> Signal:
+    """Where each sample of what follows a signal starts, by the mean over it that `low_pass` gave."""
+    return signal + (mean - signal) / state.mean_remainder if state.mean_remainder else signal
+
+
 def approach(goal: Signal, kept: Signal, value: Signal) -> tuple[Signal, Signal]:
     """Go towards a goal (…, time), of which each sample keeps a share of the way: where each starts, and the end."""
     value = np.broadcast_to(value, goal.shape[:-1])

@@ -135,24 +135,30 @@ class Chain:
 
     def begin(self, context: FilterContext) -> tuple[Memory, ...]:
         """Every effect's memory, each with a seed of its own."""
-        seeds = (zlib.crc32(effect.name.encode(), context.seed) for effect in self.effects)
-        return tuple(one.begin(replace(context, seed=seed)) for one, seed in zip(self.effects, seeds, strict=True))
+        return tuple(effect.begin(own) for effect, own in self._with_seeds(context))
+
+    def _with_seeds(self, context: FilterContext) -> list[tuple[Any, FilterContext]]:
+        return [
+            (effect, replace(context, seed=zlib.crc32(effect.name.encode(), context.seed))) for effect in self.effects
+        ]
 
     def begin_amid(
         self, context: FilterContext, whole: FilterContext, signal: Signal, row: Signal, sample: Signal
     ) -> Memory:
         """The memories of windows (W, …) that begin at a sample (W,) of a row (W,) of longer signals.
 
-        What came before, in those signals (rows, time, channels) of the context `whole`, counts where an effect recalls
-        it.
+        What came before, in those signals (rows, time, channels) of the context `whole`, counts: an effect recalls it,
+        or begins at rest with what it made of the sample before.
         """
-        memories = list(self.begin(context))
-        recalling = [number for number, effect in enumerate(self.effects) if hasattr(effect, "recall")]
-        for number in range(max(recalling, default=-1) + 1):
-            effect: Any = self.effects[number]
-            if number in recalling:
-                memories[number] = effect.recall(context, signal, row, sample)
-            signal, _ = effect.apply(signal, effect.begin(whole))
+        memories = []
+        for (effect, ahead), (_, driven) in zip(self._with_seeds(context), self._with_seeds(whole), strict=True):
+            made, _ = effect.apply(signal, effect.begin(driven))
+            if hasattr(effect, "recall"):
+                memories.append(effect.recall(ahead, signal, row, sample))
+            else:
+                before = np.where((sample > 0)[:, None], made[row, sample - 1], driven.rest[row])
+                memories.append(effect.begin(replace(ahead, rest=before)))
+            signal = made
         return tuple(memories)
 
     def apply(self, signal: Signal, memories: tuple[Memory, ...]) -> tuple[Signal, tuple[Memory, ...]]:

@@ -4,6 +4,7 @@ First how forward speed, sideways speed and yaw rate change each other; then wha
 last how the pose that is tracked differs from that of the axle's middle.
 """
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -29,6 +30,7 @@ from proxytune.effects.effect import (
     parameter,
     reckon,
     start_reckoning,
+    starts_of,
 )
 from proxytune.space import Parameter
 
@@ -142,6 +144,11 @@ class YawLag(ShippedEffect):
         late, after = low_pass(signal[..., 2:], memory)
         return np.concatenate((signal[..., :2], late), axis=-1), after
 
+    def recall(self, context: FilterContext, signal: Signal, row: Signal, sample: Signal) -> LowPassState:
+        """The memory of windows (W, …) that begin at a sample (W,) of a row (W,) of longer signals (rows, time, 3)."""
+        asked, state = signal[..., 2:], self.begin(replace(context, rest=np.zeros((len(signal), 3))))
+        return state._replace(value=starts_of(asked, low_pass(asked, state)[0], state)[row, sample])
+
 
 LEAST_DAMPING = 0.05
 """So much of the resistance to turning at rest is always left."""
@@ -187,15 +194,28 @@ class Inertia(ShippedEffect):
 
     def apply(self, signal: Signal, memory: BodyState) -> tuple[Signal, BodyState]:
         """The mean motion over each sample; turning is resisted by the mean forward speed of that sample."""
-        (pushed, after), yaw = low_pass(signal[..., :1], memory.forward), memory.yaw
-        damping = self._damping(pushed[..., 0])
-        steady = signal[..., 2] / damping
-        if self.turn:
-            samples = self.turn * memory.rate_hz / damping
-            kept = np.exp(-1.0 / samples)
-            starts, yaw = approach(steady, kept, yaw)
-            steady = steady + samples * (1.0 - kept) * (starts - steady)
-        return np.stack((pushed[..., 0], signal[..., 1], steady), axis=-1), memory._replace(forward=after, yaw=yaw)
+        pushed, after = low_pass(signal[..., :1], memory.forward)
+        turned, _, yaw = self._turned(signal[..., 2], pushed[..., 0], memory)
+        return np.stack((pushed[..., 0], signal[..., 1], turned), axis=-1), memory._replace(forward=after, yaw=yaw)
+
+    def recall(self, context: FilterContext, signal: Signal, row: Signal, sample: Signal) -> BodyState:
+        """The memory of windows (W, …) that begin at a sample (W,) of a row (W,) of longer signals (rows, time, 3)."""
+        body = self.begin(replace(context, rest=np.zeros((len(signal), 3))))
+        pushed, _ = low_pass(signal[..., :1], body.forward)
+        forward = starts_of(signal[..., :1], pushed, body.forward)
+        _, yaw, _ = self._turned(signal[..., 2], pushed[..., 0], body)
+        return body._replace(forward=body.forward._replace(value=forward[row, sample]), yaw=yaw[row, sample])
+
+    def _turned(self, asked: Signal, forward: Signal, body: BodyState) -> tuple[Signal, Signal, Signal]:
+        """The yaw rate on average over each sample and at its start (…, time), and at the end of the last (…,)."""
+        damping = self._damping(forward)
+        steady = asked / damping
+        if not self.turn:
+            return steady, steady, body.yaw
+        samples = self.turn * body.rate_hz / damping
+        kept = np.exp(-1.0 / samples)
+        starts, end = approach(steady, kept, body.yaw)
+        return steady + samples * (1.0 - kept) * (starts - steady), starts, end
 
     def _damping(self, forward: Signal) -> Signal:
         return np.maximum(LEAST_DAMPING, 1.0 + self.linear * forward + self.square * forward**2)

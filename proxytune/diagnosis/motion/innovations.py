@@ -14,6 +14,7 @@ import functools
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import ModuleType
+from typing import Any
 
 import numpy as np
 from scipy.linalg import LinAlgError, cholesky_banded
@@ -345,9 +346,7 @@ def window_twists(drives: Drives, theta: Theta, begin: Whole, length: int, added
     if not train.motion.effects:
         return train.ideal(wheels)
     asked, driven = train.ideal(whole), replace(_setting(drives), rest=np.zeros((len(whole), 3)))
-    before = np.zeros_like(asked)
-    before[:, 1:] = train.motion.apply(asked, train.motion.begin(driven))[0][:, :-1]
-    ahead = _window_setting(drives, begin, before)
+    ahead = _window_setting(drives, begin)
     past = train.motion.begin_amid(ahead, driven, asked, drives.episode[begin], drives.first[begin])
     return np.asarray(train.motion.apply(train.ideal(wheels), past)[0])
 
@@ -356,16 +355,21 @@ def _window_wheels(
     drives: Drives, theta: Theta, begin: Whole, length: int, added: Floats | None
 ) -> tuple[Floats, Floats]:
     """Wheel speeds in whole drives (E, T, 2), and in windows (W, length, 2), there from measured ones on if any are."""
-    (train, _), commands = _model(drives, theta), arrived_commands(drives, theta)
-    commands = commands if added is None else commands + added
-    whole = wheel_speeds(drives, theta) if added is None else _turned(drives, train, commands)
+    train, _ = _model(drives, theta)
+    if added is None:
+        whole = wheel_speeds(drives, theta)
+    else:
+        whole = _turned(drives, train, arrived_commands(drives, theta) + added)
     episode, start = drives.episode[begin], drives.first[begin]
     ticks = np.minimum(start[:, None] + np.arange(length), whole.shape[1] - 1)
-    if drives.wheels is None:
-        return whole, rows_at(whole, episode[:, None], ticks)
-    asked = rows_at(train.within_range(commands), episode[:, None], ticks)
-    turning = replace(_setting(drives), rest=drives.wheels[episode, start])
-    return whole, train.actuation.apply(asked, train.actuation.begin(turning))[0]
+    modelled = rows_at(whole, episode[:, None], ticks)
+    lags: list[Any] = [effect for effect in train.actuation.effects if effect.name == "motor_lag"]
+    if drives.wheels is None or not lags:
+        return whole, modelled
+    # What else a drivetrain recalls, its heat, its play, its battery, is the model's; the lag forgets a difference.
+    before = np.where(start[:, None] > 0, whole[episode, start - 1], drives.rest[episode])
+    off = replace(_setting(drives), rest=drives.wheels[episode, start] - (before + modelled[:, 0]) / 2.0)
+    return whole, modelled + lags[0].apply(np.zeros_like(modelled), lags[0].begin(off))[0]
 
 
 LearntMotion = list[tuple[Floats, Floats]]
@@ -375,7 +379,7 @@ LearntMotion = list[tuple[Floats, Floats]]
 def window_features(drives: Drives, theta: Theta, learnt: Learnt, begin: Whole, length: int) -> Iterator[LearntMotion]:
     """Motion that each weight of a learnt effect beside a model adds in such windows, those over commands last."""
     whole, asked = twists_of(drives, theta), window_twists(drives, theta, begin, length)
-    past = learnt.recall(_window_setting(drives, begin, whole), whole, drives.episode[begin], drives.first[begin])
+    past = learnt.recall(_window_setting(drives, begin), whole, drives.episode[begin], drives.first[begin])
     yield from ([one] for one in learnt.features(asked, past))
     # Every weight over commands is a replay of the drives.
     arrived, before = arrived_commands(drives, theta), learnt.commands.begin(_setting(drives))
@@ -401,12 +405,12 @@ def tracked(drives: Drives, theta: Theta, walked: Floats) -> Floats:
     return np.asarray(measurement.apply(walked, measurement.begin(rest))[0])
 
 
-def _window_setting(drives: Drives, begin: Whole, before: Floats) -> FilterContext:
-    """The setting of motion effects in windows: the motion before each, its place, and the angles of its wheels."""
+def _window_setting(drives: Drives, begin: Whole) -> FilterContext:
+    """The setting of motion effects in windows: the place where each begins, and the angles of its wheels."""
     episode, start = drives.episode[begin], drives.first[begin]
     return replace(
         _setting(drives),
-        rest=before[episode, start],
+        rest=np.zeros((len(begin), 3)),
         headings=drives.poses[begin, 0, 2:],
         places=drives.poses[begin, :1, :2],
         angles=drives.angles[episode, start][:, None],

@@ -108,7 +108,18 @@ def replayed():
     return planted_drives(TRUTH, episodes=3, seconds=8.0, noise=None)
 
 
-@pytest.mark.parametrize("theta", [TRUTH, RICH], ids=["declared", "rich"])
+BODIES = {
+    "inertia": {"inertia.forward": 0.2, "inertia.turn": 0.3, "inertia.linear": 1.5, "inertia.square": 1.0},
+    "inertia with slip": {"inertia.turn": 0.3, "inertia.linear": -1.0, "turn_slip": 0.05, "lateral_slip": 0.03},
+    "lag with scrub": {"yaw_lag": 0.4, "yaw_scrub": 0.2, "understeer": 0.5, "turn_slip": 0.05},
+}
+
+
+@pytest.mark.parametrize(
+    "theta",
+    [TRUTH, RICH, *({**TRUTH, **body} for body in BODIES.values())],
+    ids=["declared", "rich", *BODIES],
+)
 def test_increments_are_differences_of_paths_of_which_windows_at_the_start_or_amid_them_are_parts(replayed, theta):
     walked = paths(replayed, theta)
     assert walked.shape == (3, replayed.duties.shape[1] + 1, 3)

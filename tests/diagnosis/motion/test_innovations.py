@@ -173,6 +173,16 @@ def test_windows_start_from_measured_wheel_speeds_where_there_are_any_and_are_to
     assert np.abs(window_paths(measured, TRUTH, begin, 60) - known).max() > 0.02
 
 
+@pytest.mark.parametrize("effect", ["battery_sag.fade", "thermal_fade.loss", "backlash.gap"])
+def test_a_window_from_measured_wheel_speeds_recalls_what_its_drive_did_to_battery_motors_and_gears(effect):
+    theta = {"thermal_fade.time_constant": 5.0, effect: 0.4}
+    drives = planted_drives({}, episodes=2, seconds=30.0, noise=None)
+    begin = np.flatnonzero((drives.first % 300 == 0) & (drives.first > 0))
+    measured = replace(drives, wheels=wheel_speeds(drives, theta))
+    plain, known = (window_paths(one, theta, begin, 120) for one in (drives, measured))
+    np.testing.assert_allclose(known, plain, atol=0.01)
+
+
 def test_what_models_share_is_kept_what_differs_is_not_and_learnt_commands_are_replayed_each(replayed, drives):
     kept = {"delay": 0.05, "trim": 0.05, "motor_lag.time_constant": 0.2}
     thetas = [kept, {**kept, "delay": 0.1}, {**kept, "trim": -0.05}, {**kept, "yaw_lag": 0.2}, kept]

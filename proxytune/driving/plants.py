@@ -67,9 +67,17 @@ class Drivetrain:
 
     def begin(self, context: FilterContext) -> DrivetrainState:
         """Begin as if the resting command of `context` had been given for ever."""
-        still = np.zeros((*np.shape(context.rest)[:-1], len(CHANNELS[Stage.MOTION])))
-        motion = self.motion.begin(replace(context, rest=still))
+        motion = self.motion.begin(replace(context, rest=self.resting_twist(context)))
         return DrivetrainState(self.command.begin(context), self.actuation.begin(context), motion)
+
+    def resting_twist(self, context: FilterContext) -> Signal:
+        """The twist (…, 3) that wheels ask for under the resting command of `context`."""
+        still = np.zeros((*np.shape(context.rest)[:-1], len(CHANNELS[Stage.MOTION])))
+        if not np.any(context.rest):
+            return still
+        arrived, _ = self.command.apply(np.asarray(context.rest)[..., None, :], self.command.begin(context))
+        wheels, _ = self.actuation.apply(self.within_range(arrived), self.actuation.begin(context))
+        return self.ideal(wheels)[..., 0, :]
 
     def apply(self, signal: Signal, memory: DrivetrainState) -> tuple[Signal, DrivetrainState]:
         """The twists that the next chunk of duties leads to."""

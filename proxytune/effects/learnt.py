@@ -154,10 +154,11 @@ class Learnt:
         """The time constants of changes: both groups over them have the same."""
         return self._constants("transients") or self._constants("changes")
 
-    def recall(self, context: FilterContext, signal: Signal, row: Signal, sample: Signal) -> LearntState:
+    def recall(
+        self, context: FilterContext, whole: FilterContext, signal: Signal, row: Signal, sample: Signal
+    ) -> LearntState:
         """The memory of windows (W, …) that begin at a sample (W,) of a row (W,) of longer signals (rows, time, 3)."""
-        whole = self.begin(FilterContext(context.rate_hz, np.zeros((len(signal), 3)), context.nominal))
-        asked, _ = self._asked(signal, whole)
+        asked, _ = self._asked(signal, self.begin(whole))
 
         def before(values: Signal) -> Signal:
             return np.where((sample > 0).reshape(-1, *[1] * (values.ndim - 2)), values[row, sample - 1], 0.0)

@@ -154,7 +154,7 @@ class Chain:
         for (effect, ahead), (_, driven) in zip(self._with_seeds(context), self._with_seeds(whole), strict=True):
             made, _ = effect.apply(signal, effect.begin(driven))
             if hasattr(effect, "recall"):
-                memories.append(effect.recall(ahead, signal, row, sample))
+                memories.append(effect.recall(ahead, driven, signal, row, sample))
             else:
                 before = np.where((sample > 0)[:, None], made[row, sample - 1], driven.rest[row])
                 memories.append(effect.begin(replace(ahead, rest=before)))

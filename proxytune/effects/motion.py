@@ -4,7 +4,6 @@ First how forward speed, sideways speed and yaw rate change each other; then wha
 last how the pose that is tracked differs from that of the axle's middle.
 """
 
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -144,9 +143,11 @@ class YawLag(ShippedEffect):
         late, after = low_pass(signal[..., 2:], memory)
         return np.concatenate((signal[..., :2], late), axis=-1), after
 
-    def recall(self, context: FilterContext, signal: Signal, row: Signal, sample: Signal) -> LowPassState:
+    def recall(
+        self, context: FilterContext, whole: FilterContext, signal: Signal, row: Signal, sample: Signal
+    ) -> LowPassState:
         """The memory of windows (W, …) that begin at a sample (W,) of a row (W,) of longer signals (rows, time, 3)."""
-        asked, state = signal[..., 2:], self.begin(replace(context, rest=np.zeros((len(signal), 3))))
+        asked, state = signal[..., 2:], self.begin(whole)
         return state._replace(value=starts_of(asked, low_pass(asked, state)[0], state)[row, sample])
 
 
@@ -198,9 +199,11 @@ class Inertia(ShippedEffect):
         turned, _, yaw = self._turned(signal[..., 2], pushed[..., 0], memory)
         return np.stack((pushed[..., 0], signal[..., 1], turned), axis=-1), memory._replace(forward=after, yaw=yaw)
 
-    def recall(self, context: FilterContext, signal: Signal, row: Signal, sample: Signal) -> BodyState:
+    def recall(
+        self, context: FilterContext, whole: FilterContext, signal: Signal, row: Signal, sample: Signal
+    ) -> BodyState:
         """The memory of windows (W, …) that begin at a sample (W,) of a row (W,) of longer signals (rows, time, 3)."""
-        body = self.begin(replace(context, rest=np.zeros((len(signal), 3))))
+        body = self.begin(whole)
         pushed, _ = low_pass(signal[..., :1], body.forward)
         forward = starts_of(signal[..., :1], pushed, body.forward)
         _, yaw, _ = self._turned(signal[..., 2], pushed[..., 0], body)

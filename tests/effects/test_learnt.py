@@ -157,7 +157,8 @@ def test_a_window_amid_a_drive_goes_on_as_the_drive_does(effect, sample):
     walked = [integrate_twists(one, 1.0 / RATE_HZ, 0.4) for one in whole]
     places = np.array([walked[r][sample, :2] for r in row])[:, None]
     context = FilterContext(RATE_HZ, np.zeros((3, 3)), ROBOT.figures, headings=turned[:, None], places=places)
-    moved, _ = effect.apply(drives[row][:, sample:], effect.recall(context, drives, row, samples))
+    driven = FilterContext(RATE_HZ, np.zeros((2, 3)), ROBOT.figures)
+    moved, _ = effect.apply(drives[row][:, sample:], effect.recall(context, driven, drives, row, samples))
     np.testing.assert_allclose(moved, np.stack([whole[r][sample:] for r in row]), rtol=0, atol=1e-9)
 
 

@@ -259,11 +259,11 @@ def paths(drives: Drives, theta: Theta, duties: Floats | None = None) -> Floats:
 
 def twists_of(drives: Drives, theta: Theta, duties: Floats | None = None) -> Floats:
     """The motion that a model asks of the plant, tick by tick (E, T, 3): [m/s], [m/s], [rad/s]."""
-    train, setting = _model(drives, theta)[0], _setting(drives)
+    train, _ = _model(drives, theta)
     if duties is not None:
-        return np.asarray(train.apply(duties, train.begin(setting))[0])
-    still = replace(setting, rest=np.zeros((len(drives.rest), 3)))
-    return np.asarray(train.motion.apply(train.ideal(wheel_speeds(drives, theta)), train.motion.begin(still))[0])
+        return np.asarray(train.apply(duties, train.begin(_setting(drives)))[0])
+    begun = train.motion.begin(_motion_setting(drives, train))
+    return np.asarray(train.motion.apply(train.ideal(wheel_speeds(drives, theta)), begun)[0])
 
 
 def arrived_commands(drives: Drives, theta: Theta) -> Floats:
@@ -345,9 +345,8 @@ def window_twists(drives: Drives, theta: Theta, begin: Whole, length: int, added
     whole, wheels = _window_wheels(drives, theta, begin, length, added)
     if not train.motion.effects:
         return train.ideal(wheels)
-    asked, driven = train.ideal(whole), replace(_setting(drives), rest=np.zeros((len(whole), 3)))
-    ahead = _window_setting(drives, begin)
-    past = train.motion.begin_amid(ahead, driven, asked, drives.episode[begin], drives.first[begin])
+    settings = _window_setting(drives, begin), _motion_setting(drives, train)
+    past = train.motion.begin_amid(*settings, train.ideal(whole), drives.episode[begin], drives.first[begin])
     return np.asarray(train.motion.apply(train.ideal(wheels), past)[0])
 
 
@@ -379,7 +378,8 @@ LearntMotion = list[tuple[Floats, Floats]]
 def window_features(drives: Drives, theta: Theta, learnt: Learnt, begin: Whole, length: int) -> Iterator[LearntMotion]:
     """Motion that each weight of a learnt effect beside a model adds in such windows, those over commands last."""
     whole, asked = twists_of(drives, theta), window_twists(drives, theta, begin, length)
-    past = learnt.recall(_window_setting(drives, begin), whole, drives.episode[begin], drives.first[begin])
+    settings = _window_setting(drives, begin), _motion_setting(drives, _model(drives, theta)[0])
+    past = learnt.recall(*settings, whole, drives.episode[begin], drives.first[begin])
     yield from ([one] for one in learnt.features(asked, past))
     # Every weight over commands is a replay of the drives.
     arrived, before = arrived_commands(drives, theta), learnt.commands.begin(_setting(drives))
@@ -403,6 +403,11 @@ def tracked(drives: Drives, theta: Theta, walked: Floats) -> Floats:
         return walked
     rest = replace(_setting(drives), rest=walked[:, 0])
     return np.asarray(measurement.apply(walked, measurement.begin(rest))[0])
+
+
+def _motion_setting(drives: Drives, train: Drivetrain) -> FilterContext:
+    """The setting of motion effects in whole drives."""
+    return replace(_setting(drives), rest=train.resting_twist(_setting(drives)))
 
 
 def _window_setting(drives: Drives, begin: Whole) -> FilterContext:

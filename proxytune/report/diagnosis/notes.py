@@ -37,17 +37,13 @@ def motion_headline(diagnosis: Diagnosis, found: str = "", beside: str = "") -> 
 def say_verdict(found: str, beside: str, verdict: str, part: str, at_ends: Sequence[str]) -> str:
     """A verdict and what it means, after what was found, if anything was, and beside it what was fitted."""
     head = f"{found}{beside}. {verdict.capitalize()}" if found else f"{verdict}{beside}"
-    return f"{head}: {_meaning_of(verdict, part, at_ends)}"
-
-
-def _meaning_of(verdict: str, part: str, at_ends: Sequence[str]) -> str:
-    """What a verdict on motion or the camera means; values at the end of all that is possible explain nothing."""
     meaning = VERDICTS[verdict][part]
     if not at_ends:
-        return meaning
+        return f"{head}: {meaning}"
+    # A value at the end of all that is possible explains nothing.
     rest = "" if verdict == "partly explained" else f"; {meaning}"
     stand = f"{listed(at_ends)} at the end of the range {'stands' if len(at_ends) == 1 else 'stand'}"
-    return f"{stand} for something else, which no named effect explains{rest}"
+    return f"{head}: {stand} for something else, which no named effect explains{rest}"
 
 
 def motion_notes(diagnosis: Diagnosis) -> list[str]:

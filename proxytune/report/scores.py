@@ -173,12 +173,10 @@ def _tables(assessments: Assessments, selection: Selection | None, target: str) 
 
 
 def _rates(rates: SuccessRates) -> Table:
-    rows = []
-    for agent, target in rates.target.items():
-        proxy = rates.proxy[agent]
-        rows.append((agent, str(proxy), str(proxy.episodes), str(target), str(target.episodes)))
+    both = ((agent, rates.proxy[agent], target) for agent, target in rates.target.items())
+    rows = tuple((agent, str(p), str(p.episodes), str(t), str(t.episodes)) for agent, p, t in both)
     title = f"{rates.metric}: success rates with their own 95 % intervals (Wilson)"
-    return Table(title, columns_of(("agent",), ("in the proxy", "episodes", "on the target", "episodes")), tuple(rows))
+    return Table(title, columns_of(("agent",), ("in the proxy", "episodes", "on the target", "episodes")), rows)
 
 
 def _ranking(assessments: Assessments, selection: Selection, target: str, notes: tuple[str, ...]) -> Table:

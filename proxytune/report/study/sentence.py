@@ -6,7 +6,6 @@ from math import ceil
 
 from proxytune.diagnosis import MOTION_EFFECTS
 from proxytune.report.wording import as_known, in_pairs, listed, pairs_span, percent, plain, probability, short, span
-from proxytune.scores import Metric
 from proxytune.study import DEFAULT_FAMILY, StudyResult
 
 MOST_NAMED = 5
@@ -122,7 +121,10 @@ def say_next_step(result: StudyResult) -> str:
         return f"log drives of the target (a model's: `record`) and run `python -m proxytune diagnose LOG{declared}`"
     if result.judged.chance.explains and result.judged.chance.mean == 0.0:
         # Every order of the proxy's scores is right only where the target ranks none.
-        return f"give {_say_what_ranks(settings.metrics)}: on the target none of these agents ranks above another"
+        others = ["other agents"]
+        others += ["smaller tolerances"] if any(metric.tolerance for metric in settings.metrics) else []
+        others += ["fewer metrics"] if len(settings.metrics) > 1 else []
+        return f"give {', or '.join(others)}: on the target none of these agents ranks above another"
     if result.judged.chance.explains:
         return f"{_more_trials(result)}, or add agents whose scores differ more"
     if not _is_fresh(result) and result.rescored:
@@ -134,13 +136,6 @@ def say_next_step(result: StudyResult) -> str:
         return f"{found}to know {plain(_least_known(result).name)} better, {_say_what_to_add(result)}"
     # Where no trial has come into the region yet, starts are not what is missing.
     return f"{_say_what_to_add(result) if result.inside else _more_trials(result)}, to get closer"
-
-
-def _say_what_ranks(metrics: Sequence[Metric]) -> str:
-    """Say what to change so that agents rank: one above another if it is better by a metric and worse by none."""
-    others = ["smaller tolerances"] if any(metric.tolerance for metric in metrics) else []
-    others += ["fewer metrics"] if len(metrics) > 1 else []
-    return ", or ".join(["other agents", *others])
 
 
 def _least_known(result: StudyResult) -> KnownParameter:

@@ -147,14 +147,6 @@ def _first_line(found: object, otherwise: str) -> str:
     return (inspect.getdoc(found) or otherwise).partition("\n")[0]
 
 
-def _learners(own: Names) -> list[Row]:
-    return _described("learner", own, LEARNERS, "how_it_learns")
-
-
-def _families(own: Names) -> list[Row]:
-    return _described("family", own, FAMILIES, "what_it_simulates")
-
-
 def _described(kind: str, own: Names, shipped: Mapping[str, str], told: str) -> list[Row]:
     known = {} if own else dict(shipped)
     for name, code in _outside(kind, own, shipped).items():
@@ -212,6 +204,6 @@ _KINDS: Mapping[str, Callable[[Names], list[Row]]] = {
     "metrics": lambda own: [{"name": name, "unit": unit} for name, unit in METRICS.items()],
     "engines": _engines,
     "measures": _measures,
-    "learners": _learners,
-    "families": _families,
+    "learners": lambda own: _described("learner", own, LEARNERS, "how_it_learns"),
+    "families": lambda own: _described("family", own, FAMILIES, "what_it_simulates"),
 }

@@ -155,7 +155,11 @@ def _known(settings: StudySettings) -> Iterator[StudyRun]:
 
 def _robots(run: StudyRun, targets: Sequence[Path]) -> Iterator[Robot]:
     # All tables are read before any is learnt from.
-    measured = [_measured(run, path) for path in targets]
+    measured = []
+    for path in targets:
+        known, left_out = with_scores(replace(run.settings, targets=(path,)))
+        table, unused = read_target(known, run.study.family)
+        measured.append((run.of(replace(run.study, settings=known, target=table)), (*left_out, *unused)))
     first: Knowledge | None = None
     seen: dict[bytes, str] = {}
     for name, path, (one, left_out) in zip(_names(targets), targets, measured, strict=True):
@@ -167,13 +171,6 @@ def _robots(run: StudyRun, targets: Sequence[Path]) -> Iterator[Robot]:
         like = seen.setdefault(goal.values.tobytes(), name)
         copied = "" if like == name else f"{path}: scores as {like} to the last digit; a copy is no other robot"
         yield Robot(name, path, own, tuple(filter(None, (*left_out, noise_of(one).caution, copied))))
-
-
-def _measured(run: StudyRun, path: Path) -> tuple[StudyRun, tuple[str, ...]]:
-    """The study with this robot for its target, and what of its table is left out."""
-    known, left_out = with_scores(replace(run.settings, targets=(path,)))
-    table, unused = read_target(known, run.study.family)
-    return run.of(replace(run.study, settings=known, target=table)), (*left_out, *unused)
 
 
 def _names(targets: Sequence[Path]) -> list[str]:

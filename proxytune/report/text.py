@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 from rich.console import Console, ConsoleOptions, Group, RenderableType, RenderResult
 from rich.markup import escape
-from rich.measure import Measurement, measure_renderables
+from rich.measure import measure_renderables
 from rich.table import Table as TerminalTable
 from rich.text import Text
 
@@ -38,9 +38,6 @@ class WholeWords:
         for column, width in zip(columns, widths, strict=True):
             column.width = width
         yield from console.render(self.table, options.update(width=sum(widths) + GAP * (len(widths) - 1)))
-
-    def __rich_measure__(self, console: Console, options: ConsoleOptions) -> Measurement:
-        return Measurement.get(console, options, self.table)
 
 
 def table_text(table: Table, *, ragged: bool = False) -> WholeWords:

@@ -131,12 +131,9 @@ class _Pairs:
     counts: Floats
     correlation: float
     correlation_interval: Ends
-    square: float
-    """Of the correlation, without what chance adds to that of few pairs."""
-    sure_square: float
-    """Of a correlation lower by its standard error: what is chosen for being high is too high."""
-    shares: Floats
-    """N/(n + N) of each agent."""
+    square: float  # of the correlation, without what chance adds to that of few pairs
+    sure_square: float  # of one lower by its standard error: what is chosen for being high is too high
+    shares: Floats  # N/(n + N) of each agent
 
     @property
     def share(self) -> float:

@@ -104,12 +104,7 @@ class Lessons:
     seed: int
     lesson_s: float  # how long a lesson takes [s]
     grid: tuple[int, ...]  # number of samples after each round
-    by: str  # who drives
-
-    @property
-    def on_policy(self) -> bool:
-        """True if the learner drives."""
-        return self.by == learning.LEARNER
+    on_policy: bool  # whether the learner drives
 
     @property
     def ends(self) -> tuple[int, ...]:
@@ -290,7 +285,7 @@ class TeachingSetup:
 
     def _lessons(self, domain: str, where: learning.Distribution, seed: int, ends: tuple[int, ...], by: str) -> Lessons:
         room, identity = self._room(domain), self.identities[int(domain == "target")]
-        return Lessons(room, identity, where, seed, self.settings.lesson_s, ends, by)
+        return Lessons(room, identity, where, seed, self.settings.lesson_s, ends, by == learning.LEARNER)
 
     def _room(self, domain: str) -> OnPolicyClassroom:
         family = self.proxy if domain == "proxy" else self.target

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, astuple, replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -279,14 +279,8 @@ def _curve_document(curve: LearningCurve) -> dict[str, Any]:
     return {"target_samples": list(curve.counts), "scores": scores, "examinations": len(curve.examined)}
 
 
-class _Look(NamedTuple):
-    label: str
-    colour: str
-    style: str
-    mark: str
-
-
-WITHOUT, WITH = _Look("without a proxy", style.GREY, "--", "x"), _Look("with the proxy", style.BLUE, "-", "o")
+WITHOUT, WITH = ("without a proxy", style.GREY, "--", "x"), ("with the proxy", style.BLUE, "-", "o")
+"""Of the learner's curve: its name, colour, line and mark."""
 
 
 def teach_figure(experiment: teaching.Experiment) -> Figure:
@@ -299,8 +293,8 @@ def teach_figure(experiment: teaching.Experiment) -> Figure:
     figure, panels = style.panel_grid(len(lessons), 1.25, 0.6, sharex=True, sharey=True)
     for axes, lesson in zip(panels, lessons, strict=True):
         worth = lesson.worth
-        _draw_learner(axes, experiment, NONE, WITHOUT, worth.without if worth else None)
-        _draw_learner(axes, experiment, lesson.name, WITH, worth.needed if worth else None)
+        _draw_learner(axes, experiment, NONE, worth.without if worth else None)
+        _draw_learner(axes, experiment, lesson.name, worth.needed if worth else None)
         axes.axhline(experiment.when.threshold, color="0.3", linewidth=0.8, linestyle=":", label="converged")
         axes.set_xticks(_places(experiment, np.array(shown, dtype=float)), [f"{count:g}" for count in shown])
         axes.set_title(lesson.name, fontsize=8)
@@ -315,22 +309,21 @@ def teach_figure(experiment: teaching.Experiment) -> Figure:
     return figure
 
 
-def _draw_learner(
-    axes: Axes, experiment: teaching.Experiment, name: str, look: _Look, needed: LearningEstimate | None
-) -> None:
+def _draw_learner(axes: Axes, experiment: teaching.Experiment, name: str, needed: LearningEstimate | None) -> None:
     """Draw a learner's curve with its band and examinations, and the interval of the samples that it needs."""
+    label, colour, line, mark = WITHOUT if name == NONE else WITH
     draws, curve = experiment.needs.draws, experiment.needs.curves[name]
     at, scores, examined = _places(experiment, draws.counts), draws.scores[name], curve.examined
     low, high = np.quantile(scores, LEVELS, axis=0)
-    axes.fill_between(at, low, high, color=look.colour, alpha=0.18, linewidth=0)
-    axes.plot(at, scores.mean(axis=0), look.style, color=look.colour, linewidth=1.2, label=look.label)
+    axes.fill_between(at, low, high, color=colour, alpha=0.18, linewidth=0)
+    axes.plot(at, scores.mean(axis=0), line, color=colour, linewidth=1.2, label=label)
     seen = _places(experiment, np.array(curve.counts, dtype=float))[examined[:, 1]]
-    axes.plot(seen, curve.scores[tuple(examined.T)], look.mark, color=look.colour, markersize=2, alpha=0.35)
+    axes.plot(seen, curve.scores[tuple(examined.T)], mark, color=colour, markersize=2, alpha=0.35)
     if needed is not None and needed.low is not None:
         # Off the line of convergence, so that the bars of both learners stay apart
         level = experiment.when.threshold + (-1.2 if name == NONE else 1.2)
         ends = np.array([needed.low, experiment.needs.last if needed.high is None else needed.high])
-        axes.hlines(level, *_places(experiment, ends), color=look.colour, linewidth=2.5)
+        axes.hlines(level, *_places(experiment, ends), color=colour, linewidth=2.5)
 
 
 def _places(experiment: teaching.Experiment, counts: Floats) -> Floats:

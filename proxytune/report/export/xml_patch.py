@@ -4,7 +4,6 @@ import difflib
 import re
 import xml.etree.ElementTree as ET
 from pathlib import Path
-from typing import NamedTuple
 from xml.parsers import expat
 from xml.sax.saxutils import escape, quoteattr
 
@@ -13,14 +12,6 @@ from proxytune.settings import SETTINGS_MB, check_end
 
 ATTRIBUTE = rb"""\s+%b\s*=\s*("[^"]*"|'[^']*')"""
 OPENING = re.compile(rb"""<[^'">]*(?:(?:"[^"]*"|'[^']*')[^'">]*)*>""")
-
-
-class Place(NamedTuple):
-    """Bytes from where an element begins to behind its first tag, and to before its last one."""
-
-    begin: int
-    opened: int
-    end: int
 
 
 class XmlPatch:
@@ -34,7 +25,8 @@ class XmlPatch:
             self._before = self._bytes.decode("utf-8")
         except (OSError, UnicodeDecodeError) as problem:
             raise InputError(f"{path}: cannot be read ({problem}); check the path, and that it is UTF-8") from None
-        self._places: dict[ET.Element, Place] = {}
+        # Bytes from where an element begins to behind its first tag, and to before its last one
+        self._places: dict[ET.Element, tuple[int, int, int]] = {}
         self._changes: list[tuple[int, int, str]] = []
         builder, parser, open_elements = ET.TreeBuilder(), expat.ParserCreate(), list[tuple[ET.Element, int, int]]()
 
@@ -45,7 +37,7 @@ class XmlPatch:
 
         def end(tag: str) -> None:
             element, begun, opened = open_elements.pop()
-            self._places[element] = Place(begun, opened, max(opened, parser.CurrentByteIndex))
+            self._places[element] = (begun, opened, max(opened, parser.CurrentByteIndex))
             builder.end(tag)
 
         parser.StartElementHandler, parser.EndElementHandler = begin, end
@@ -80,7 +72,7 @@ class XmlPatch:
 
     def add(self, parent: ET.Element, text: str) -> None:
         """Write an element first of all in a parent that has others, indented as these."""
-        opened = self._places[parent].opened
+        _, opened, _ = self._places[parent]
         inner = re.match(rb"\s*", self._bytes[opened:])
         self._write(parent, (opened, opened), (inner.group().decode() if inner else "") + text)
 

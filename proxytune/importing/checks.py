@@ -74,11 +74,9 @@ def _check_commands(commands: Commands, poses: Poses, about: str) -> None:
 
 
 def _usual_speed(poses: Poses) -> float:
-    """The speed [m/s] that is exceeded for a tenth of the drive."""
+    """The speed [m/s] that is exceeded for a tenth of a drive that lasts longer than a chord."""
     later = np.searchsorted(poses.times, poses.times + CHORD_S)
     here = np.flatnonzero(later < len(poses.times))
-    if not len(here):
-        return 0.0
     chords = poses.places[later[here], :2] - poses.places[here, :2]
     return float(np.percentile(np.hypot(*chords.T) / (poses.times[later[here]] - poses.times[here]), 90))
 

@@ -116,9 +116,8 @@ def start_places(table: ScoreTable) -> Whole:
 def repeats(table: ScoreTable) -> Whole:
     """Count the repeats that each agent drove of each start, shape (agents, starts)."""
     places = start_places(table)
-    order = np.argsort(places, kind="stable")
-    firsts = np.searchsorted(places[order], np.arange(places.max() + 1))
-    return np.add.reduceat(table.driven[:, order].astype(np.int64), firsts, axis=1)
+    starts = int(places.max()) + 1
+    return np.stack([np.bincount(places[driven], minlength=starts) for driven in table.driven])
 
 
 def is_repeated(table: ScoreTable) -> bool:

@@ -148,10 +148,8 @@ def open_loop(path: Path, twin: Path | None = None, log: Path | None = None) -> 
     twin = _twin(settings, twin, robot)
     loop = Loop(settings, family, robot, twin, log, held_out_of(settings, family, driven=twin is not None))
     for name in loop.held_out:
-        try:
+        with settings.complaints_about(KEY):
             family.check_agent(name)
-        except InputError as problem:
-            raise settings.error(KEY, str(problem)) from None
     _check_log(loop)
     try:
         loop.home.mkdir(exist_ok=True)

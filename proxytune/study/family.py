@@ -15,7 +15,7 @@ from typing import Any, cast
 
 from proxytune.domain import DomainFamily
 from proxytune.effects import parameter_hint
-from proxytune.errors import ExtensionError, InputError
+from proxytune.errors import ExtensionError
 from proxytune.extensions import ask, load
 from proxytune.identity import digest, meaning_of, modules_beside
 from proxytune.settings import nearest
@@ -62,10 +62,8 @@ def bare_family(settings: StudySettings, model: Path | None) -> DomainFamily:
         raise settings.error("proxy", f"no such file: {model}; check the path")
     if settings.family == GIVEN:
         raise settings.error("family", "is what was given in Python; call proxytune.tune again with this folder")
-    try:
+    with settings.complaints_about("family"):
         factory = load(settings.family, kind="family", beside=settings.folder, needs=("__call__",))
-    except InputError as problem:
-        raise settings.error("family", str(problem)) from None
     _check_signature(settings, factory, model)
     refuse = functools.partial(settings.error, "family")
     family = ask(settings.family, lambda: factory(settings.domain, model=model), refuse=refuse)
@@ -103,12 +101,9 @@ def _check(settings: StudySettings, family: DomainFamily) -> None:
         if metric.name not in family.metrics:
             raise settings.error("metrics", f"unknown metric '{metric.name}'; {nearest(metric.name, family.metrics)}")
     for agent, name in zip(settings.agents, settings.loaded_agents, strict=True):
-        try:
+        key = f"agents.{agent}" if agent in settings.aliases else "agents"
+        with settings.complaints_about("held_out" if agent in settings.held_out else key):
             ask(f"check_agent('{name}') of {settings.family}", functools.partial(family.check_agent, name))
-        except InputError as problem:
-            key = f"agents.{agent}" if agent in settings.aliases else "agents"
-            key = "held_out" if agent in settings.held_out else key
-            raise settings.error(key, str(problem)) from None
 
 
 def check_bounds(

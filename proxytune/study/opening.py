@@ -125,13 +125,12 @@ def objective_of(settings: StudySettings) -> Objective:
         return PRPV
     if name in KEPT:
         return KEPT[name]
-    try:
+    with settings.complaints_about("objective"):
         if ":" not in name and name not in plugins("measure", KEPT):
-            known = (*KEPT, LEARNING)
-            raise InputError(f"unknown measure '{name}' (your own is written module:attribute); {nearest(name, known)}")
-        return _as_objective(name, measure_of(name, settings.folder))
-    except InputError as problem:
-        raise settings.error("objective", str(problem)) from None
+            hint = nearest(name, (*KEPT, LEARNING))
+            raise InputError(f"unknown measure '{name}' (your own is written module:attribute); {hint}")
+        objective = _as_objective(name, measure_of(name, settings.folder))
+    return objective
 
 
 def measure_of(name: str, beside: Path | None = None) -> Measure:
@@ -221,10 +220,8 @@ def cautions_of(family: DomainFamily) -> tuple[str, ...]:
 
 
 def _engine(settings: StudySettings) -> Engine:
-    try:
+    with settings.complaints_about("engine"):
         engine = engine_of(settings.engine, settings.folder)
-    except InputError as problem:
-        raise settings.error("engine", str(problem)) from None
     if not engine.in_studies:
         raise settings.error("engine", f"'{engine.name}' is for `compare` only; {nearest(engine.name, ENGINE_NAMES)}")
     if reason := why_not_engine(engine, composed=settings.objective != LEARNING):

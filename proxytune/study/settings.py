@@ -6,7 +6,8 @@ and whose changes nobody notices.
 """
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -222,6 +223,14 @@ class StudySettings:
         """The one-line complaint about a key that only the domain family could check."""
         where = f"{FAMILIES}.{self.family_name}: " if self.family_name else ""
         return Section(self.path, where, {}).error(key, problem)
+
+    @contextmanager
+    def complaints_about(self, key: str) -> Iterator[None]:
+        """Have whatever InputError is raised meanwhile be a complaint about a key."""
+        try:
+            yield
+        except InputError as problem:
+            raise self.error(key, str(problem)) from None
 
     def check_single(self) -> None:
         """Refuse a study of several families where one is needed, and say how to name one of them."""

@@ -17,7 +17,7 @@ import numpy as np
 from proxytune import learning, study, usefulness
 from proxytune.arrays import Floats
 from proxytune.domain import Classroom
-from proxytune.errors import InputError, LearnerError
+from proxytune.errors import LearnerError
 from proxytune.extensions import load
 from proxytune.running import Watcher
 from proxytune.space import Theta
@@ -70,10 +70,8 @@ class Experiment:
 def load_setup(settings: study.StudySettings) -> TeachingSetup:
     """Load the families and the learner that a study's [teaching] names; an InputError tells file, key and remedy."""
     taught = teaching_settings(settings)
-    try:
+    with settings.complaints_about("teaching.learner"):
         found = load(taught.learner, kind="learner", beside=settings.folder, needs=("train", "act"), call=True)
-    except InputError as problem:
-        raise settings.error("teaching.learner", str(problem)) from None
     learner = cast(learning.Learner, found)
     return TeachingSetup(
         proxy=classroom(settings, settings.proxy, "proxy_lessons"),

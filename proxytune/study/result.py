@@ -102,11 +102,13 @@ class StudyResult:
     def perfect(self) -> bool:
         """True if the proxy cannot be told from a perfect one.
 
-        By the PRPV expected of it, and by every other output: where the answer lies outside the 95 % region, these
-        tell.
+        By the PRPV and PPV expected of it, and by every other output: where the answer lies outside the 95 % region,
+        these tell.
         """
-        excess, fits = self.excess, self.knowledge.misfit.fits is not False and self.inside
-        return excess is not None and excess.low <= 0.0 and not self.judged.chance.explains and fits
+        if self.expected is None or self.judged.chance.explains or not self.inside:
+            return False
+        excesses = [one.excess for one in (self.expected.prpv, self.expected.ppv) if one]
+        return self.knowledge.misfit.fits is not False and all(one is not None and one.low <= 0.0 for one in excesses)
 
     @property
     def dead(self) -> frozenset[str]:

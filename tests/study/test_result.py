@@ -41,7 +41,7 @@ from proxytune.study.answer import (
 from proxytune.study.facts import NOMINAL
 from proxytune.study.run import knowledge_of
 from proxytune.study.settings import StopRules
-from proxytune.usefulness import compare
+from proxytune.usefulness import Estimate, compare
 from proxytune.usefulness.pairs import prpv
 
 ONE = 6 * 3
@@ -284,6 +284,9 @@ def test_perfect_is_only_what_neither_prpv_nor_any_other_output_tells_from_the_t
         found = result_of(StudyRun(study, store))
     assert found.judged.prpv.value == 0
     assert found.judged.at_noise_floor is True
+    worse = replace(found.expected.ppv, excess=Estimate(0.3, 0.2, 0.4))
+    apart = replace(found.confirmation, expected=replace(found.expected, ppv=worse))
+    assert (found.perfect, replace(found, confirmation=apart).perfect) == (True, False)
     for inside, fits, perfect in ((True, True, True), (False, True, False), (True, False, False)):
         one = replace(found)
         monkeypatch.setattr(type(found.knowledge), "holds", lambda *_, inside=inside: inside)

@@ -25,7 +25,7 @@ from proxytune.report import write_text
 from proxytune.scores import Metric, ScoreTable, read_scores
 from proxytune.settings import check_numbers, nearest
 from proxytune.space import Parameter, Theta
-from proxytune.study import FILE_NAME, GIVEN, Study, open_settings, plan_episodes, read_study_settings
+from proxytune.study import FILE_NAME, GIVEN, Study, check_box, open_settings, plan_episodes, read_study_settings
 
 Simulate = Callable[..., float | Mapping[str, float]]
 HEAD = "# Written by proxytune.tune, which writes it anew at every call.\n"
@@ -132,6 +132,8 @@ def tune(
         }
         write_text(home / FILE_NAME, HEAD + toml_text(stated, "tune"))
         settings = read_study_settings(home)
+        if agents:  # whose effects may be unfit to wrap it; a constructor takes what the box says
+            check_box(settings, simulate.family)
         own = {
             one.name: Parameter(name=one.name, unit="", low=one.low, high=one.high, neutral=float("nan"))
             for one in space.intervals

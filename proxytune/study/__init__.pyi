@@ -32,6 +32,7 @@ from .family import (
     GIVEN as GIVEN,
     bare_family as bare_family,
     check_bounds as check_bounds,
+    check_box as check_box,
     load_family as load_family,
     user_code as user_code,
 )

@@ -91,10 +91,7 @@ def _check(settings: StudySettings, family: DomainFamily) -> None:
         value = ask(what, functools.partial(getattr, family, member), refuse=refuse)
         if not isinstance(value, kind):
             raise settings.error("family", f"{what} must be {word}, got {type(value).__name__}")
-    for interval in settings.space.intervals:
-        given = f"[{interval.low:g}, {interval.high:g}]"
-        bounds = (interval.low, interval.high)
-        check_bounds(settings, family, f"parameters.{interval.name}", interval.name, bounds, given)
+    check_box(settings, family)
     if settings.starts > family.starts:
         raise settings.error("starts", f"the family has {family.starts}, got {settings.starts}")
     for metric in settings.metrics:
@@ -104,6 +101,14 @@ def _check(settings: StudySettings, family: DomainFamily) -> None:
         key = f"agents.{agent}" if agent in settings.aliases else "agents"
         with settings.complaints_about("held_out" if agent in settings.held_out else key):
             ask(f"check_agent('{name}') of {settings.family}", functools.partial(family.check_agent, name))
+
+
+def check_box(settings: StudySettings, family: DomainFamily) -> None:
+    """Refuse parameters of the box that the family has not, or beyond what they can be: a SettingsError says which."""
+    for interval in settings.space.intervals:
+        given = f"[{interval.low:g}, {interval.high:g}]"
+        bounds = (interval.low, interval.high)
+        check_bounds(settings, family, f"parameters.{interval.name}", interval.name, bounds, given)
 
 
 def check_bounds(

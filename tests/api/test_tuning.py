@@ -174,3 +174,19 @@ def test_an_environment_is_tuned_by_argument_attribute_or_effect(parameter):
     )
     assert report.trials()["prpv"].notna().all()
     assert set(report.theta) == {parameter}
+
+
+@pytest.mark.parametrize(
+    ("box", "said"),
+    [
+        ({"trim": (-0.2, 0.2)}, "effect 'trim' cannot wrap this environment: it is made for two actions"),
+        ({"camera_pitch": (10.0, 30.0)}, "effect 'camera_pitch' cannot wrap this environment"),
+        ({"marker_offset.forward": (0.0, 0.1)}, "effect 'marker_offset' cannot wrap this environment"),
+        ({"delay": (-0.3, 0.3)}, "parameters.delay: must lie within [0, "),
+    ],
+)
+def test_an_effect_that_cannot_wrap_an_environment_is_refused_with_the_reason(box, said):
+    pytest.importorskip("gymnasium")
+    scores = pd.DataFrame({"agent": ["soft", "zero"], "return": [-90.0, -200.0]})
+    given = {"metrics": "return:max", "agents": {"soft": soft, "zero": "zero"}, "budget": 2}
+    assert said in complaint_of(proxytune.tune, "Pendulum-v1", box, scores, **given)

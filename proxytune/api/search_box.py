@@ -70,9 +70,12 @@ class SearchBox:
             InputError: If this θ was not asked for or has a score already, or the score is not a finite number.
         """
         place = self._place(theta)
-        value = None if score is None else float(score)
+        try:
+            value = None if score is None else float(score)
+        except (TypeError, ValueError):
+            value = math.nan
         if value is not None and not math.isfinite(value):
-            raise InputError(f"a score must be a finite number, or None where the simulation failed, got {value}")
+            raise InputError(f"a score must be a finite number, or None where the simulation failed, got {score!r}")
         self._scores[place] = value
 
     def best(self) -> tuple[dict[str, float], float]:

@@ -324,6 +324,8 @@ def noise_of(run: StudyRun) -> NoiseVariance:
     if shares_starts(study) and placed is not None:
         return NoiseVariance(placed * (1.0 / driven + 1.0 / measured))
     remedy = "to know θ better, measure the target from the study's own starts and leave the pre-flight on"
+    if set(map(start_of, study.target.episodes)) == {str(start) for start in range(1, driven + 1)}:
+        remedy += f"; if its episodes 1 to {driven} are these starts, number them 0 to {driven - 1}"
     if study.target.counts.min() >= 2:
         values = study.target.values
         count = np.sum(~np.isnan(values), axis=1, keepdims=True)

@@ -95,7 +95,7 @@ def test_a_failed_simulation_is_kept_and_only_a_theta_that_was_asked_for_can_be_
     assert "was not asked for; tell what `ask` gave" in complaint_of(box.tell, {**theta, "trim": 0.0}, 1.0)
     assert "θ: trim must be a number, got None" in complaint_of(box.tell, {**theta, "trim": None}, 1.0)
     assert "θ names trim; the box has delay, trim" in complaint_of(box.tell, {"trim": 0.0}, 1.0)
-    for wrong in (math.nan, math.inf):
+    for wrong in (math.nan, math.inf, "x"):
         assert "a score must be a finite number, or None" in complaint_of(box.tell, theta, wrong)
     box.tell(theta, 1.0)
     assert "has a score already; ask for the next" in complaint_of(box.tell, theta, 1.0)

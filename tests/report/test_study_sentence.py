@@ -173,6 +173,8 @@ def test_without_fresh_episodes_or_before_its_end_a_study_says_so_and_how_to_go_
 def test_where_the_target_ranks_no_agent_above_another_it_is_said_and_what_would_rank_them(metrics, step):
     text = said(chance=Chance(0.0, 0.0, 1.0, 1000), metrics=tuple(map(Metric.parse, metrics)))
     assert text.endswith(f" Next: {step}: on the target none of these agents ranks above another.")
+    level = said(chance=Chance(21.0, 0.0, 1.0, 1000), fits=False, metrics=tuple(map(Metric.parse, metrics)))
+    assert level.endswith(f" Next: {step}: on the target, or in the proxy, none of these agents ranks above another.")
 
 
 def test_where_noise_is_not_known_nothing_is_said_of_a_perfect_proxy_and_the_nominal_stands_beside():

@@ -81,6 +81,19 @@ def test_noise_is_that_of_placement_and_less_with_repeats(make_study):
     assert unknown.caution.startswith("noise is estimated from the spread between the target's episodes")
 
 
+def from_one(rows):
+    split = [row.split(",", 2) for row in rows]
+    return [f"{agent},{int(start) + 1},{rest}" for agent, start, rest in split]
+
+
+def test_episodes_that_are_numbered_from_one_are_pointed_out_where_noise_is_not_known(make_study):
+    folder = make_study(preflight="false")
+    edited(folder, from_one)
+    with running(folder) as study_run:
+        caution = preflight.noise_of(study_run).caution
+    assert caution.endswith("; if its episodes 1 to 3 are these starts, number them 0 to 2")
+
+
 def twice(rows):
     """Every start driven twice, labelled START/REPEAT."""
     split = [row.split(",", 2) for row in rows]

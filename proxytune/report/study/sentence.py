@@ -113,19 +113,20 @@ def say_next_step(result: StudyResult) -> str:
     settings, fits = result.study.settings, result.knowledge.misfit.fits
     if left := _trials_left(result):
         return f"run the study again for the {left} trials that are left"
+    if (chance := result.judged.chance).deviation == 0.0:  # every order of the proxy's scores is as good
+        others = ["other agents"]
+        others += ["smaller tolerances"] if any(metric.tolerance for metric in settings.metrics) else []
+        others += ["fewer metrics"] if len(settings.metrics) > 1 else []
+        # Every order is right only where the target ranks none.
+        where = "on the target" if chance.mean == 0.0 else "on the target, or in the proxy,"
+        return f"give {', or '.join(others)}: {where} none of these agents ranks above another"
     if fits is False and settings.family != DEFAULT_FAMILY:
         return "look for what the simulator lacks, or widen the box; of a robot on wheels a log tells (`diagnose`)"
     if fits is False:
         effects = declared_of(settings.space.names)
         declared = f" --declared {','.join(effects)}" if effects else ""
         return f"log drives of the target (a model's: `record`) and run `python -m proxytune diagnose LOG{declared}`"
-    if result.judged.chance.explains and result.judged.chance.mean == 0.0:
-        # Every order of the proxy's scores is right only where the target ranks none.
-        others = ["other agents"]
-        others += ["smaller tolerances"] if any(metric.tolerance for metric in settings.metrics) else []
-        others += ["fewer metrics"] if len(settings.metrics) > 1 else []
-        return f"give {', or '.join(others)}: on the target none of these agents ranks above another"
-    if result.judged.chance.explains:
+    if chance.explains:
         return f"{_more_trials(result)}, or add agents whose scores differ more"
     if not _is_fresh(result) and result.rescored:
         return "search by these metrics: give them to a new study, with learn_from = [this one]"

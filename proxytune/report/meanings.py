@@ -15,7 +15,14 @@ from proxytune.files import package_table
 from proxytune.report.wording import digits, fixed, listed, plain, short, span
 
 SHARED_OUT = "the right wheel has {} more of it than both have on average, the left one as much less"
-UNEVEN = ("dead_band", "stiction", "saturation", "motor_lag", "backlash")
+UNEVEN = {
+    "dead_band": "width",
+    "stiction": "breakaway",
+    "saturation": "limit",
+    "motor_lag": "time_constant",
+    "backlash": "gap",
+}
+"""Effects that are shared out between the wheels, and what of each is."""
 CLAUSES: Mapping[str, str] = package_table("report/templates/clauses.toml") | {
     f"{effect}.imbalance": SHARED_OUT for effect in UNEVEN
 }
@@ -50,8 +57,11 @@ def finding(effect: Mapping[str, Any], catalogue: Catalogue = SHIPPED) -> str:
     sized = {key: one for key, one in known.items() if one["value"] is not None}
     # What a form of the effect holds at 0 says nothing.
     sizes = {key: _size(one) for key, one in sized.items() if one["value"] != 0.0 or len(set(one["interval"])) > 1}
-    said = [_clause(own.get(key, key), sized[key]) or f"{plain(key)} {size}" for key, size in sizes.items()]
-    return f"{plain(name)}: {'; '.join([listed(said), *_worth(effect)])}" if said else plain(name)
+    said = {key: _clause(own.get(key, key), sized[key]) or f"{plain(key)} {size}" for key, size in sizes.items()}
+    if "imbalance" in said and UNEVEN.get(name) in said:
+        del said["imbalance"]
+        said[UNEVEN[name]] += _on_each_wheel(name, sized)
+    return f"{plain(name)}: {'; '.join([listed(list(said.values())), *_worth(effect)])}" if said else plain(name)
 
 
 def _clause(name: str, estimate: Mapping[str, Any]) -> str:
@@ -62,6 +72,16 @@ def _clause(name: str, estimate: Mapping[str, Any]) -> str:
     ends = [None if end is None else -end for end in reversed(estimate["interval"])]
     less = {**estimate, "value": -estimate["value"], "interval": ends}
     return CLAUSES[name].replace(adds, "1 − {}").format(_size(less))
+
+
+def _on_each_wheel(effect: str, sized: Mapping[str, Mapping[str, Any]]) -> str:
+    """What each wheel has of an effect that is shared out between them."""
+    value, share = sized[UNEVEN[effect]]["value"], sized["imbalance"]["value"]
+    # A limit takes away what is above it.
+    left, right = (
+        1.0 - (1.0 - value) * part if effect == "saturation" else value * part for part in (1.0 - share, 1.0 + share)
+    )
+    return f" on average, {short(left)} on the left wheel and {short(right)} on the right"
 
 
 def findings(effects: Iterable[Mapping[str, Any]], catalogue: Catalogue = SHIPPED) -> str:

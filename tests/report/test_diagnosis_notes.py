@@ -57,6 +57,15 @@ def diagnosis(**changes):
     return SimpleNamespace(**{**plain, **changes})
 
 
+def test_what_is_left_is_told_and_beside_an_explained_motion_that_values_may_stand_in_for_it():
+    parts = {"log": SimpleNamespace(), "residual_depends_on": ("wheel speed", "heading")}
+    little = " ".join(motion_notes(diagnosis(**parts)))
+    assert "no named effect explains what little is left, which depends on: wheel speed, heading; the values" in little
+    much = " ".join(motion_notes(diagnosis(verdict="unexplained", **parts)))
+    assert "no named effect explains the rest, which depends on: wheel speed, heading" in much
+    assert "may stand in for it" not in much
+
+
 @pytest.mark.parametrize("verdict", VERDICTS)
 def test_every_verdict_is_told_with_its_meaning(verdict):
     assert motion_headline(diagnosis(verdict=verdict)) == f"run: {verdict}: {VERDICTS[verdict]['motion']}"

@@ -54,6 +54,19 @@ def test_what_was_found_or_declared_is_told_with_name_meaning_size_and_worth_and
     assert finding({"name": "inertia", "parameters": resists}).endswith(
         "by the factor 1 − 0.01 s²/m² (−0.01 to 0.02) times the square of the speed"
     )
+    limit = {"value": 0.98, "interval": [0.97, 0.99], "unit": "duty"}
+    share = {"value": 1.0, "interval": [0.9, 1.0], "unit": ""}
+    assert finding({"name": "saturation", "parameters": {"limit": limit, "imbalance": share}}) == (
+        "saturation: wheels turn no faster than at a duty of 0.98 (0.97 to 0.99) on average, 1 on the left wheel and "
+        "0.96 on the right"
+    )
+    lag = {"value": 0.2, "interval": [0.19, 0.21], "unit": "s"}
+    assert finding(
+        {"name": "motor_lag", "parameters": {"time_constant": lag, "imbalance": {**share, "value": 0.1}}}
+    ) == (
+        "motor lag: wheels follow their commands with a lag of 0.20 s (0.19 to 0.21) on average, 0.18 on the left "
+        "wheel and 0.22 on the right"
+    )
     assert findings([BAND, SLIP]) == f"{finding(BAND)}; {finding(SLIP)}"
 
     assert "without it" not in finding({**SLIP, "worth": {"2": {"value": 0.0, "interval": [-2.0, 2.0], "unit": "%"}}})

@@ -65,8 +65,10 @@ def motion_notes(diagnosis: Diagnosis) -> list[str]:
         ratios = ", ".join(f"{h:g} s: {one.value:.2f}" for h, one in diagnosis.multistep.ratios.items())
         fitted = f"parameters were fitted to windows of {diagnosis.multistep.horizon_s:g} s instead of single steps"
         lines.append(f"{fitted}; ratio of the errors on blocks left out: {ratios}")
-    if diagnosis.residual_depends_on:
-        lines.append(f"no named effect explains the rest, which depends on: {', '.join(diagnosis.residual_depends_on)}")
+    if rest := ", ".join(diagnosis.residual_depends_on):
+        calm = diagnosis.verdict in ("explained", "nothing missing")
+        left, so = ("what little is left", "; the values found may stand in for it") if calm else ("the rest", "")
+        lines.append(f"no named effect explains {left}, which depends on: {rest}{so}")
     if diagnosis.period is not None:
         behind = f"the robot falls behind {diagnosis.period}; a new drive does not tell when, so no model has it"
         lines.append(f"{behind}: look for what cuts the motors' power, or holds up their commands, so often")

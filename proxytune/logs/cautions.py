@@ -24,8 +24,8 @@ MOVES = 0.3
 """A chord counts from this share of the fast ones on."""
 TURNED = 0.8
 """Headings that point less alike than this (1: all the same way) can tell a mirrored axis."""
-FITS, MISFITS = 0.85, 0.5
-"""Headings and courses belong together above the one, and do not below the other (1: exactly)."""
+FITS, BY_MORE = 0.85, 0.3
+"""Headings and courses belong together above the one (1: exactly), mirrored ones if by so much more than as they are."""
 LATEST_S = 1.5
 """Turning is looked for so long after its command."""
 AGAINST = 0.5
@@ -118,7 +118,7 @@ def _axes(drives: list[Chords]) -> Iterator[str]:
     together, mirrored, spread = (
         float(np.abs(np.mean(np.exp(2j * angle)))) for angle in (course - heading, course + heading, heading)
     )
-    if spread < TURNED and together < MISFITS and mirrored > FITS:
+    if spread < TURNED and mirrored > max(FITS, together + BY_MORE):
         remedy = "reverse x or y, or exchange them, so that headings turn from x to y"
         yield f"places are mirrored against headings: the robot moves where a mirror image of it points; {remedy}"
     askew = math.degrees(float(np.angle(np.mean(np.exp(2j * (course - heading)))))) / 2.0

@@ -89,6 +89,19 @@ def test_what_is_probably_not_meant_is_told_in_one_sentence(log, expected):
     assert re.search(expected, line)
 
 
+@pytest.mark.parametrize("mirror", [False, True])
+def test_a_mirror_is_told_of_a_drive_that_hardly_turns(mirror):
+    """Most of its way leads straight ahead, and there a mirror image looks the same."""
+    times = np.arange(0.0, 20.0, 0.05)
+    heading = np.clip(times - 14.0, 0.0, np.pi / 3.0)
+    step = 0.3 * 0.05 * np.stack((np.cos(heading), np.sin(heading)), axis=1)
+    places = np.cumsum(step, axis=0) * ((1.0, -1.0) if mirror else (1.0, 1.0))
+    poses = np.column_stack((places, heading))
+    duties = np.full((len(times), 2), 0.5)
+    log = replace(LOG, episodes=(replace(LOG.episodes[0], times=times, poses=poses, commands=duties),))
+    assert any("mirrored against headings" in line for line in cautions(log)) is mirror
+
+
 CALM = [CLEAN[0], *IN_FORM[::10], *OTHER_FORM[::7], *OUTSIDE[::3]]
 
 

@@ -149,7 +149,11 @@ def test_offsets_of_clocks_can_be_written_one_clock_is_no_news_and_a_declared_of
     assert clocks_document((found, clocks()))["test"]["offset_s"] == 0.0
     assert clocks_notes("yard", (clocks(),), {}) == []
     (note,) = clocks_notes("yard", (clocks(),), {"delay": 0.1})
-    assert "one number" in note
+    assert note.endswith("are one number: the delay is the robot's only if one clock stamped both")
+    *_, note = clocks_notes("yard", (found,), {"delay": 0.1})
+    assert note.endswith(
+        "the robot's own delay cannot be told here, as an offset was taken out: set both to one clock to know it"
+    )
     declared = replace(clocks(), declared_s=-0.25)
     assert clocks_document((declared,))["declared_offset_s"] == -0.25
     (note,) = clocks_notes("yard", (declared,), {"delay": 0.1})

@@ -164,7 +164,10 @@ def clocks_notes(log: str, clocks: Sequence[Clocks], theta: Mapping[str, Any]) -
         notes.append(f"{later}; that was taken out")
     elif "delay" in theta:
         same = "delay and an offset between the clocks of commands and poses are one number"
-        notes.append(f"{same}: the delay is the robot's only if one clock stamped both")
+        moved = any(own.offset.value for own in clocks)
+        known = "is the robot's only if one clock stamped both"
+        lost = "cannot be told here, as an offset was taken out: set both to one clock to know it"
+        notes.append(f"{same}: the robot's own delay {lost}" if moved else f"{same}: the delay {known}")
     return notes
 
 

@@ -25,7 +25,7 @@ MOVES = 0.3
 TURNED = 0.8
 """Headings that point less alike than this (1: all the same way) can tell a mirrored axis."""
 FITS, BY_MORE = 0.85, 0.3
-"""Headings and courses belong together above the one (1: exactly); mirrored ones if by so much more than as they are."""
+"""Headings and courses belong together above the one (1: exactly); those of a mirror image if by so much more."""
 LATEST_S = 1.5
 """Turning is looked for so long after its command."""
 AGAINST = 0.5

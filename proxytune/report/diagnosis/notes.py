@@ -278,7 +278,7 @@ def learnt_notes(learning: Learning) -> list[str]:
         )
         notes.append(f"learnt, not physics: curves over {curves}; position error with them at {worth}")
         own = ", ".join(f"{name} {value:.3g}" for name, value in learning.theta.items() if not is_learnt(name))
-        notes += [f"fitted along with the curves: {own}"] if own else []
+        notes += [f"model.toml has what was fitted along with the curves: {own}"] if own else []
         notes += _say_map(learning.theta) + _say_commands(learning.theta)
     elif beside.theta:
         notes.append(f"curves over {curves} were tried and dropped: they do not clearly help on drives left out")

@@ -226,7 +226,7 @@ def test_what_is_learnt_is_told_with_its_worth_as_no_physics_and_names_that_are_
     assert "left out" in refused
     moved = replace(USED, discrepancy=replace(USED.discrepancy, theta={**THETA, "delay": 0.1}), names_doubtful=True)
     _, own, warning = learnt_notes(moved)
-    assert own == "fitted along with the curves: delay 0.1"
+    assert own == "model.toml has what was fitted along with the curves: delay 0.1"
     assert "names are likely wrong" in warning
     assert learnt_document(moved)["names_doubtful"] is True
     assert learnt_notes(Learning(Discrepancy(), (), False)) == []

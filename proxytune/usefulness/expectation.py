@@ -236,4 +236,7 @@ def _perfect(sides: Comparison, donors: Donors, rng: np.random.Generator) -> Flo
     # is 2: so one in R changes.
     alike = rng.random(values.shape[:3]) >= 1.0 / np.bincount(places)[places]
     values = np.where(alike[..., None], sides.target.values, values)
-    return np.asarray(np.nanmean(np.take_along_axis(values, each[:, None, :, None], axis=2), axis=2))
+    chosen = np.take_along_axis(values, each[:, None, :, None], axis=2)
+    # An agent that was driven from none of the starts drawn keeps its mean.
+    missing = np.isnan(chosen).all(axis=2, keepdims=True)
+    return np.asarray(np.nanmean(np.where(missing, sides.target.means[:, None], chosen), axis=2))

@@ -122,3 +122,14 @@ def test_a_simulator_that_draws_nothing_has_the_same_figures_and_at_its_true_the
             assert found.prpv.excess.low <= 0.0
     assert still(lambda truth: truth + 1.0).prpv == still(lambda truth: truth + 1.0).prpv
     assert Donors(np.zeros((1, 1)), np.ones((1, 1))).still is False
+
+
+@pytest.mark.filterwarnings("error")
+def test_an_agent_that_was_driven_from_none_of_the_starts_that_a_perfect_proxy_meets_keeps_its_mean():
+    """Of two starts an agent was driven from one: a fourth of the draws meet the other twice."""
+    fleet, rng = Fleet(3), np.random.default_rng(4)
+    first, again, measured = (fleet.drive(rng) for _ in range(3))
+    measured[0, 1:] = np.nan
+    target = table(measured[:, :2], ["x", "y"])
+    found = expect(fresh=[table(again)], target=target, metrics=M, donors=donors_of([np.stack([first, again])], 2))
+    assert np.isfinite(found.prpv.floor).all()

@@ -24,7 +24,7 @@ from proxytune.settings import nearest
 from proxytune.usefulness.comparison import Comparison, by_start, independence, start_of
 from proxytune.usefulness.predictivity import orders
 from proxytune.usefulness.resampling import CONFIDENCE, Ends, interval
-from proxytune.usefulness.saving import Saving, effective, is_rate, rate_intervals, saving_of
+from proxytune.usefulness.saving import Rectified, Saving, is_rate, rate_intervals, saving_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -188,7 +188,7 @@ def decide(inputs: Comparison, asked: Asked, saving: Saving | None = None, seed:
     middle, ends = sign * centre, [interval(sign * draws[:, row]) for row in range(len(agents))]
     most = np.zeros(len(agents))
     if inputs.target.counts.min() > 1 and not any(is_rate(inputs.target, column) for column in columns):
-        ends = _own_intervals(inputs.target, columns, middle, counts)
+        ends = _own_intervals(inputs.target, columns, middle, saving)
     if len(columns) == 1 and is_rate(inputs.target, columns[0]):
         ends = rate_intervals(middle, counts * independence(inputs.target, columns[0]))
         # Of agents that, or whose best rival, always or never succeeded: there the prior pulls draws away from rates
@@ -306,12 +306,13 @@ def draw_means(
         means, counts = target.means[:, column], target.counts.astype(np.float64)
         rectified = saving.rectified.get(target.metrics[column]) if saving is not None else None
         if rectified is not None:
-            means, counts = rectified
+            means, counts = rectified.means, rectified.worth
         if is_rate(target, column):
             independent = counts * independence(target, column)
             drawn, basis = _rates(means, independent, draws, rng), "successes, uniform prior"
         elif target.counts.min() > 1:
-            drawn, basis = _means(target, column, means, counts, draws, rng), "episodes' spread, pooled over agents"
+            drawn, counts = _means(target, column, rectified, draws, rng)
+            basis = "episodes' spread, pooled over agents"
         elif target.errors is not None and (target.errors[:, column] > 0.0).any():
             errors = np.nan_to_num(target.errors[:, column])
             drawn, basis = means + errors * rng.standard_normal((draws, len(means))), "published standard errors"
@@ -336,32 +337,50 @@ def _rates(means: Floats, counts: Floats, draws: int, rng: np.random.Generator) 
 
 
 def _means(
-    table: ScoreTable, column: int, means: Floats, counts: Floats, draws: int, rng: np.random.Generator
-) -> Floats:
-    """Student's t about each mean; where all agents share their starts, what these do to all alike is left out."""
+    table: ScoreTable, column: int, rectified: Rectified | None, draws: int, rng: np.random.Generator
+) -> tuple[Floats, Floats]:
+    """Student's t about each mean, and the rollouts that each is worth, (agents,).
+
+    Where all agents share their starts, what these do to all alike is left out.
+    """
     starts = by_start(table)
-    values = starts.values[..., column]
-    residuals = values - np.nanmean(values, axis=1, keepdims=True)
-    freedom = float(starts.counts.sum() - len(means))
-    if starts.complete and len(starts.episodes) > 1:
-        residuals = residuals - residuals.mean(axis=0)
-        freedom = float((len(means) - 1) * (len(starts.episodes) - 1))
+    freedom = float(starts.counts.sum() - len(table.agents))
+    shared = starts.complete and len(starts.episodes) > 1
+    if shared:
+        freedom = float((len(table.agents) - 1) * (len(starts.episodes) - 1))
     elif freedom < 1.0:  # one start alone, driven many times
-        residuals, freedom = table.values[..., column] - means[:, None], float(table.counts.sum() - len(means))
-    spread = np.sqrt(np.nansum(residuals**2) / freedom)
-    per = effective(counts, table, starts)
-    scale = spread / np.sqrt(per) * np.sqrt(freedom / rng.chisquare(freedom, (draws, 1)))
-    return np.asarray(means + scale * rng.standard_normal((draws, len(means))), dtype=np.float64)
+        starts, freedom = table, float(table.counts.sum() - len(table.agents))
+
+    def variance(values: Floats) -> float:
+        residuals = values - np.nanmean(values, axis=1, keepdims=True)
+        residuals -= residuals.mean(axis=0) if shared else 0.0
+        return float(np.nansum(residuals**2)) / freedom
+
+    means, own = table.means[:, column], variance(starts.values[..., column])
+    variances = np.full(len(means), own)
+    if rectified is not None:
+        means = rectified.means
+        variances += rectified.shares * (variance(rectified.rest) - own)
+        # What is chosen for being alike is too much alike.
+        variances = np.maximum(variances, own * table.counts / rectified.worth)
+    scale = np.sqrt(variances / starts.counts * freedom / rng.chisquare(freedom, (draws, 1)))
+    worth = table.counts * own / variances if own > 0.0 else table.counts.astype(np.float64)
+    return means + scale * rng.standard_normal((draws, len(means))), worth
 
 
-def _own_intervals(table: ScoreTable, columns: Sequence[int], middle: Floats, counts: Floats) -> list[Ends]:
+def _own_intervals(table: ScoreTable, columns: Sequence[int], middle: Floats, saving: Saving | None) -> list[Ends]:
     """Student's t of each agent's own scores about its mean: what a start does to all agents alike belongs to it."""
     from scipy.special import stdtrit
 
     starts = by_start(table)
     starts = starts if starts.counts.min() > 1 else table
-    spread = np.nanstd(starts.values[..., columns].mean(axis=-1), axis=1, ddof=1)
-    reach = stdtrit(starts.counts - 1.0, 0.5 + CONFIDENCE / 2.0) * spread / np.sqrt(effective(counts, table, starts))
+    rectified = [saving.rectified.get(table.metrics[column]) if saving else None for column in columns]
+    scores = [starts.values[..., column] for column in columns]
+    rest = [own if one is None else one.rest for own, one in zip(scores, rectified, strict=True)]
+    own, less = (np.nanvar(np.mean(values, axis=0), axis=1, ddof=1) for values in (scores, rest))
+    share = np.max([one.shares for one in rectified if one], axis=0, initial=0.0)
+    reach = stdtrit(starts.counts - 1.0, 0.5 + CONFIDENCE / 2.0)
+    reach *= np.sqrt(((1.0 - share) * own + share * less) / starts.counts)
     return list(zip(map(float, middle - reach), map(float, middle + reach), strict=True))
 
 

@@ -14,7 +14,7 @@ import itertools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -32,6 +32,15 @@ It holds at fixed rates with 92 % or more, and with 96 to 97 % on average over a
 SORTED = "outcomes are sorted by value in every agent: episode numbers are no pairs and no order in time"
 
 
+class Rectified(NamedTuple):
+    """The target's means by paired starts; the variance of one is ((1 − share) s² of scores + share s² of rest)/n."""
+
+    means: Floats  # (agents,)
+    worth: Floats  # rollouts on the target that each is worth by the correlation within agents, (agents,)
+    rest: Floats  # scores less λ times the proxy's, (agents, starts)
+    shares: Floats  # N/(n + N) of each agent
+
+
 @dataclass(frozen=True)
 class Saving:
     """What the proxy's rollouts are worth in rollouts on the target, of each agent on average."""
@@ -47,8 +56,7 @@ class Saving:
     # each agent's rectified mean with its 95 % interval, on the metric it was asked for
     means: Mapping[str, tuple[float, Ends]] = field(default_factory=dict)
     alone: Mapping[str, tuple[float, Ends]] = field(default_factory=dict)  # the same from the target alone
-    # by metric, rectified means and what each is worth, (agents,) each, where pairs help beyond noise
-    rectified: Mapping[str, tuple[Floats, Floats]] = field(default_factory=dict)
+    rectified: Mapping[str, Rectified] = field(default_factory=dict)  # by metric, where pairs help beyond noise
     reason: str = ""  # why nothing is saved or known; "" if something is
 
     @property
@@ -56,12 +64,6 @@ class Saving:
         """The share of real rollouts that is saved for one precision; None if it cannot be told."""
         worth = self.real_rollouts_worth
         return None if worth is None else worth / (self.real + worth)
-
-
-def effective(counts: Floats, table: ScoreTable, starts: ScoreTable) -> Floats:
-    """Starts that a number of episodes is worth: of repeats of a start, the start counts once."""
-    few = starts.counts if starts.counts.min() > 1 else table.counts
-    return np.asarray(counts * few / table.counts, dtype=np.float64)
 
 
 def saving_of(inputs: Comparison, column: int = 0, *others: Comparison) -> Saving:
@@ -77,7 +79,7 @@ def saving_of(inputs: Comparison, column: int = 0, *others: Comparison) -> Savin
     for place, metric in enumerate(inputs.metrics):
         found = _pairs(every, place)
         if found is not None and found.beyond_noise:
-            rectified[metric.name] = found.means, found.sure_worth
+            rectified[metric.name] = Rectified(found.means, found.sure_worth, found.rest, found.shares)
     pairs, reason = _pairs(every, column), ""
     if pairs is None:
         return _of_policies(every, column, real, simulated)
@@ -133,6 +135,7 @@ class _Pairs:
     correlation_interval: Ends
     square: float  # of the correlation, without what chance adds to that of few pairs
     sure_square: float  # of one lower by its standard error: what is chosen for being high is too high
+    rest: Floats  # the target's scores less λ times the proxy's, (agents, starts)
     shares: Floats  # N/(n + N) of each agent
 
     @property
@@ -174,8 +177,8 @@ def _pairs(every: Sequence[Comparison], column: int) -> _Pairs | None:
     shared = [label for label in other.episodes if label in known]
     if len(shared) < FEWEST_PAIRS:
         return None
-    rest = [label for label in proxies[0].episodes if label in known - set(shared)]
-    x = np.stack([one.arrange(agents=agents, episodes=shared + rest).values[..., column] for one in proxies])
+    alone = [label for label in proxies[0].episodes if label in known - set(shared)]
+    x = np.stack([one.arrange(agents=agents, episodes=shared + alone).values[..., column] for one in proxies])
     y = other.arrange(agents=agents, episodes=shared).values[..., column]
     met: Flags = np.asarray(~np.isnan(x).any(axis=0))
     more = met[:, len(shared) :].sum(axis=1)
@@ -196,6 +199,8 @@ def _pairs(every: Sequence[Comparison], column: int) -> _Pairs | None:
     middle, half = math.atanh(rho), error * math.sqrt(chdtri(used, 1.0 - CONFIDENCE))
     counted = np.concatenate([both, met[:, len(shared) :]], axis=1)
     everything = np.nanmean(np.where(counted, x, np.nan), axis=-1)
+    rest = np.full((len(agents), len(other.episodes)), np.nan)
+    rest[:, [label in known for label in other.episodes]] = y - np.einsum("i,ian->an", slopes, paired)
     means = np.nanmean(y, axis=1) - slopes @ (np.nanmean(paired, axis=-1) - everything)
     return _Pairs(
         means=means,
@@ -204,6 +209,7 @@ def _pairs(every: Sequence[Comparison], column: int) -> _Pairs | None:
         correlation_interval=(math.tanh(middle - half), math.tanh(middle + half)),
         square=max(0.0, 1.0 - (1.0 - rho**2) * freedom / max(freedom - used, 1.0)),
         sure_square=math.tanh(max(0.0, abs(middle) - error)) ** 2,
+        rest=rest,
         shares=more / (n + more),
     )
 

@@ -5,7 +5,7 @@ import pytest
 from decisions import decisions, paired, plans, savings, tests as looked_at, wealth_of
 
 from proxytune.scores import Metric, ScoreTable
-from proxytune.usefulness import compare, compare_savings, saving_of
+from proxytune.usefulness import Asked, compare, compare_savings, decide, decision, saving_of
 
 SUCCESS = [Metric("success")]
 RATES = [0.3, 0.5, 0.6, 0.7]
@@ -39,7 +39,7 @@ def test_rectified_means_use_one_proxy_or_two():
     labels = tuple(map(str, range(40)))
     proxy = ScoreTable(("a", "b"), labels, ("success",), x[..., None])
     target = ScoreTable(("a", "b"), labels[:10], ("success",), y[..., None])
-    means, _ = saving_of(compare(proxy=proxy, target=target, metrics=SUCCESS)).rectified["success"]
+    means = saving_of(compare(proxy=proxy, target=target, metrics=SUCCESS)).rectified["success"].means
     dx, dy = x[:, :10] - x[:, :10].mean(1, keepdims=True), y - y.mean(1, keepdims=True)
     slope = (dx * dy).sum() / (dx**2).sum()
     assert means == pytest.approx(y.mean(1) - slope * (x[:, :10].mean(1) - x.mean(1)))
@@ -49,6 +49,33 @@ def test_rectified_means_use_one_proxy_or_two():
     assert both.real_rollouts_worth > 2.0 * max(alone.real_rollouts_worth, saving_of(other).real_rollouts_worth)
     assert both.correlation == pytest.approx(0.99, abs=0.01)
     assert saving_of(one, 0, one).rectified["success"][0] == pytest.approx(alone.rectified["success"][0])
+
+
+def rectified_coverage(moved, runs=150, real=10, simulated=110, seed=1):
+    """How often intervals of each agent's regret and score hold, what a start does being (agents or 1, starts)."""
+    rng, regrets, scores, agents = np.random.default_rng(seed), [], [], tuple("abcd")
+    labels = tuple(map(str, range(simulated)))
+    for run in range(runs):
+        truth, start = rng.normal(size=4), rng.normal(size=(1, simulated))
+        x = start + 0.3 * rng.normal(size=(4, simulated))
+        y = truth[:, None] + moved * start[:, :real] + 0.3 * rng.normal(size=(4, real))
+        proxy = ScoreTable(agents, labels, ("success",), x[..., None])
+        target = ScoreTable(agents, labels[:real], ("success",), y[..., None])
+        inputs = compare(proxy=proxy, target=target, metrics=SUCCESS)
+        found = decide(inputs, Asked(), saving_of(inputs), run)
+        regret = dict(zip(agents, truth.max() - truth, strict=True))
+        regrets.append([low - 1e-9 <= regret[a] <= high for a, (low, high) in found.regret_interval.items()])
+        scores.append([low <= own <= high for own, (_, (low, high)) in zip(truth, found.scores.values(), strict=True)])
+    return np.mean(regrets), np.mean(scores, axis=0)
+
+
+def test_rectified_regrets_and_scores_hold_where_starts_move_all_agents_alike_or_each_in_its_own_way(monkeypatch):
+    monkeypatch.setattr(decision, "DRAWS", 1000)
+    regrets, scores = rectified_coverage(1.0)
+    assert regrets >= 0.93  # 0.67 where what starts do to all is taken off twice
+    assert scores.min() >= 0.9
+    _, scores = rectified_coverage(np.linspace(-0.5, 1.5, 4)[:, None])
+    assert scores.min() >= 0.9  # of the first 0.7 where all have the pooled correlation
 
 
 def two_halves(real=25, simulated=200, seed=3):

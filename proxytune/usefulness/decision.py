@@ -24,7 +24,7 @@ from proxytune.settings import nearest
 from proxytune.usefulness.comparison import Comparison, by_start, independence, start_of
 from proxytune.usefulness.predictivity import orders
 from proxytune.usefulness.resampling import CONFIDENCE, Ends, interval
-from proxytune.usefulness.saving import Rectified, Saving, is_rate, rate_intervals, saving_of
+from proxytune.usefulness.saving import Rectified, Saving, is_rate, is_sorted, rate_intervals, saving_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -175,7 +175,7 @@ def decide(inputs: Comparison, asked: Asked, saving: Saving | None = None, seed:
     if known is None:
         return bare
     every, counts, centre, basis = known
-    draws = np.mean(every, axis=0)
+    draws = _mean_of(every, inputs.target, columns)
     regret = draws.max(axis=1, keepdims=True) - draws
     on_top = regret <= ROUNDING * max(1.0, float(np.abs(draws).max()))
     # Agents that tie, as those that never differ, share the probability.
@@ -329,6 +329,21 @@ def draw_means(
         centre += sign * means
         bases.append(basis)
     return found, worth / len(columns), centre / len(columns), " and ".join(dict.fromkeys(bases))
+
+
+def _mean_of(every: Sequence[Floats], target: ScoreTable, columns: Sequence[int]) -> Floats:
+    """Draws of the mean of metrics, about their middle as much wider as the metrics of an episode go together."""
+    draws = np.asarray(np.mean(every, axis=0))
+    # Cells as 18/25 have no episodes: their outcomes are sorted, and go together for that alone.
+    if len(columns) == 1 or target.counts.min() < 2 or any(is_sorted(target, column) for column in columns):
+        return draws
+    values = target.values[..., columns]
+    residuals = values - np.nanmean(values, axis=1, keepdims=True)
+    apart, whole = np.nansum(residuals**2) / len(columns) ** 2, np.nansum(residuals.mean(axis=-1) ** 2)
+    if whole > apart:
+        middle = draws.mean(axis=0)
+        draws = middle + math.sqrt(whole / apart) * (draws - middle)
+    return draws.clip(np.min(every), np.max(every))
 
 
 def _rates(means: Floats, counts: Floats, draws: int, rng: np.random.Generator) -> Floats:

@@ -129,6 +129,25 @@ def test_the_regret_of_equal_agents_is_held_as_often_as_is_said(monkeypatch):
     assert np.mean(held) > 0.93
 
 
+def test_the_mean_of_stages_of_one_episode_holds_the_truth_as_often_as_is_said(monkeypatch):
+    monkeypatch.setattr(decision, "DRAWS", 1000)
+    rng, stages, scores, regrets = np.random.default_rng(6), [Metric("reached"), Metric("placed")], [], []
+    for _ in range(200):
+        rates = rng.uniform(0.2, 0.9, (4, 1)) ** [0.8, 1.25]
+        values = (rng.random((4, 25, 1)) < rates[:, None, :]).astype(float)
+        table, truth = table_of(values, metrics=("reached", "placed")), rates.mean(axis=1)
+        found, regret = decided(table, table, stages), truth.max() - truth
+        scores += [low <= own <= high for own, (_, (low, high)) in zip(truth, found.scores.values(), strict=True)]
+        spans = found.regret_interval.values()
+        regrets += [low - 1e-9 <= own <= high for own, (low, high) in zip(regret, spans, strict=True)]
+        assert 0.0 <= found.draws.min() <= found.draws.max() <= 1.0
+    assert np.mean(scores) >= 0.93  # 0.86 where stages are drawn each by itself
+    assert np.mean(regrets) >= 0.93
+    cells = table_of(np.sort(values, axis=1)[:, ::-1], metrics=("reached", "placed"))
+    found = {name: decided(one, one, stages).least_told for name, one in (("rows", table), ("cells", cells))}
+    assert found["cells"] < 0.9 * found["rows"]
+
+
 def test_repeats_of_a_start_that_always_turn_out_alike_make_nobody_surer():
     fixed = np.array([[1, 1, 0, 1, 1, 1], [0, 1, 0, 1, 0, 0]], dtype=float)
     labels = tuple(f"{start}/{repeat}" for start in range(6) for repeat in range(5))

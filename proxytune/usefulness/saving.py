@@ -225,6 +225,18 @@ def _variances(table: ScoreTable, column: int) -> Floats:
     return np.full(len(table.agents), squares / max(1.0, float(table.counts.sum() - (1.0 / share).sum())))
 
 
+def _common_share(table: ScoreTable, column: int) -> float:
+    """The share of the variance of scores that starts make by moving all agents alike; 0 where agents share none."""
+    starts = by_start(table)
+    agents, count = starts.values.shape[:2]
+    if not starts.complete or count < 2:
+        return 0.0
+    residuals = starts.values[..., column] - starts.means[:, [column]]
+    own = residuals - residuals.mean(axis=0)
+    whole = float((residuals**2).sum()) / agents
+    return min(max(1.0 - float((own**2).sum()) / (agents - 1) / whole, 0.0), 0.999) if whole > 0.0 else 0.0
+
+
 def _with_ends(table: ScoreTable, column: int, means: Floats, counts: Floats) -> dict[str, tuple[float, Ends]]:
     """Means with their 95 % intervals: of rates as rates have them, else by Student's t."""
     share = independence(table, column)
@@ -259,11 +271,14 @@ def _of_policies(every: Sequence[Comparison], column: int, real: float, simulate
     variances = _variances(inputs.target, column) / (counts * independence(inputs.target, column))
     if not (variances > 0.0).all():
         return Saving("none", None, None, None, real, simulated, reason="the target's rollouts do not differ")
-    ones = np.ones(len(agents))
-    means, spread, ends = _shrunken(target, variances, np.column_stack([ones, proxies - proxies.mean(axis=0)]))
-    _, without, _ = _shrunken(target, variances, ones[:, None])
+    # What starts do to all agents alike tells them not apart, and no model over agents takes it off.
+    common, ones = _common_share(inputs.target, column) * variances, np.ones(len(agents))
+    design = np.column_stack([ones, proxies - proxies.mean(axis=0)])
+    means, spread, ends = _shrunken(target, variances - common, design)
+    _, without, _ = _shrunken(target, variances - common, ones[:, None])
+    spread, without = spread + common, without + common
     worth = float((counts * (variances / spread - variances / without)).mean())
-    low, high = (float((counts * (variances / end - variances / without)).mean()) for end in ends)
+    low, high = (float((counts * (variances / (end + common) - variances / without)).mean()) for end in ends)
     one = len(every) == 1 and np.ptp(target) > 0.0
     r = float(np.corrcoef(proxies[:, 0], target)[0, 1]) if one else None
     return Saving(

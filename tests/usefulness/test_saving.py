@@ -119,6 +119,21 @@ def test_which_of_two_proxies_saves_more_is_told_and_without_pairs_a_model_over_
     assert "fewer than 4" in saving_of(compare(proxy=few[0], target=few[1], metrics=SUCCESS)).reason
 
 
+def test_a_model_over_agents_promises_nothing_of_what_starts_do_to_all_agents_alike():
+    rng, held, worth = np.random.default_rng(7), [], []
+    agents, labels = tuple("abcdefgh"), tuple(map(str, range(25)))
+    for _ in range(100):
+        truth = rng.normal(size=8)
+        values = truth[:, None] + rng.normal(size=25) + 0.3 * rng.normal(size=(8, 25))
+        target = ScoreTable(agents, labels, ("success",), values[..., None])
+        proxy = ScoreTable(agents, ("mean",), ("success",), (truth + 0.3 * rng.normal(size=8))[:, None, None])
+        found = saving_of(compare(proxy=proxy, target=target, metrics=SUCCESS))
+        held += [low <= own <= high for own, (_, (low, high)) in zip(truth, found.means.values(), strict=True)]
+        worth.append(found.real_rollouts_worth)
+    assert np.mean(held) >= 0.9  # 0.80 where a start counts as noise of each agent, and worth is 10
+    assert np.median(worth) < 1.0
+
+
 @pytest.mark.slow
 def test_made_up_evaluations_find_intervals_that_hold_regret_that_is_calibrated_and_a_test_that_errs_seldom():
     held, regret_held, said, found, best_said, best_found, kept, _ = decisions(4, 25, 300, 1)

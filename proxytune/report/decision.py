@@ -63,22 +63,15 @@ def next_sentence(plan: Plan, target: str) -> str:
     return text if plan.without_proxy is None else f"{text} ({plan.without_proxy} without the proxy)"
 
 
-MOSTLY = 0.5
-"""A sequential test is doubted where a smaller share of rollouts counts as independent; few starts tell it roughly."""
-
-
 def sequential_sentence(found: Sequential) -> str:
     """Say what may be concluded after these rollouts, looked at after each."""
-    alike = f"repeats of a start are alike, so that only {percent(found.independent)} of rollouts count as independent"
-    doubt = f"; but {alike}: the test supposes all, give it one a start" if found.independent < MOSTLY else ""
+    each = f"{'rollouts' if found.independent == 1.0 else 'starts, the repeats of one being one score,'} of each"
     if found.winner is not None:
-        when = f"after {found.decided_at} of {found.rounds} rollouts of each agent"
-        return f"{found.winner} is shown to be the best, {when}{doubt}"
+        return f"{found.winner} is shown to be the best, after {found.decided_at} of {found.rounds} {each} agent"
     times = [f"{name} {'over 1000' if n is None else n}" for name, n in found.expected_rounds.items()]
     lead = max(found.evidence, key=lambda agent: found.evidence[agent])
     wealth = f"{lead} has most evidence, {short(found.evidence[lead])} of {short(found.threshold)}"
-    none = f"none is shown to be the best after {found.rounds} rollouts of each ({wealth})"
-    return f"{none}; expect {', '.join(times)}{doubt}"
+    return f"none is shown to be the best after {found.rounds} {each} ({wealth}); expect {', '.join(times)}"
 
 
 def decision_table(assessment: Assessment, target: str) -> Table:

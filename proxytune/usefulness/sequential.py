@@ -5,8 +5,8 @@ and Schlaifer 1961): how many more would leave the winner by all rollouts with a
 5 % of draws? They go to the agents in proportion to what tells them from the best (optimal computing budget
 allocation, Chen et al. 2000).
 
-The test is a bet. After t rollouts of agents a and b, with p̂ foretold from the rollouts before, p₀ the mean of both and
-d = (p̂_a − p̂_b) / (2 p₀ (1 − p₀)), the wealth against "a is no better than b" is
+The test is a bet. After t starts of agents a and b, the repeats of one being one score, with p̂ foretold from those
+before, p₀ the mean of both and d = (p̂_a − p̂_b) / (2 p₀ (1 − p₀)), the wealth against "a is no better than b" is
 
     W_t = W_{t−1} · (1 + (y_a − p₀) d) (1 − (y_b − p₀) d)                      where p̂_a > p̂_b, else W_{t−1}
 
@@ -23,7 +23,7 @@ import numpy as np
 from proxytune.arrays import Floats
 from proxytune.errors import ScoresError
 from proxytune.scores import ScoreTable
-from proxytune.usefulness.comparison import Comparison, independence
+from proxytune.usefulness.comparison import Comparison, by_start
 from proxytune.usefulness.decision import Decision
 from proxytune.usefulness.resampling import CONFIDENCE
 from proxytune.usefulness.saving import SORTED, is_sorted
@@ -112,39 +112,40 @@ def _more(draws: Floats, worth: Floats, bound: float) -> Floats:
 
 @dataclass(frozen=True)
 class Sequential:
-    """The test that may be looked at after every rollout; JSON has the names of its attributes."""
+    """The test that may be looked at after every start; JSON has the names of its attributes."""
 
     winner: str | None  # the agent that is shown to be the target's best; None while none is
     decided_at: int | None  # the round at which the winner was shown; None while none is
-    rounds: int  # rollouts of every agent that were looked at, in the order of the table
+    rounds: int  # starts of every agent that were looked at, in the order of the table; without repeats, rollouts
     # the least wealth of each agent against its rivals; the agent is shown to be best at `threshold`
     evidence: Mapping[str, float]
     threshold: float  # (K − 1)/α
     # median of rounds to a decision, were the rates what they are, by bets with the proxy and without; None where
     # more than half take beyond 1000
     expected_rounds: Mapping[str, int | None]
-    independent: float  # the least share of an agent's rollouts that counts as independent; the test supposes all
+    independent: float  # the least share of an agent's rollouts that counts: 1 unless starts are repeated
 
 
 def sequential_test(inputs: Comparison, column: int = 0, *, seed: int = 0) -> Sequential:
-    """Test, rollout by rollout in the target table's order, which agent is the best.
+    """Test, start by start in the target table's order, which agent is the best; repeats of one count as their mean.
 
     Raises:
         ScoresError: If scores are not within 0 and 1, an agent has one rollout, or outcomes are sorted.
     """
     metric, agents = inputs.metrics[column], inputs.agents
-    values = _rollouts(inputs.target, column, metric.direction)
+    values = _scores(inputs.target, column, metric.direction)
     rounds = min(map(len, values))
     if len(agents) ** 2 * rounds > MOST_BETS:
         raise ScoresError(f"--sequential: {len(agents)} agents are too many to be bet on; test those that may be best")
-    if min(row.min() for row in values) < 0.0 or max(row.max() for row in values) > 1.0:
+    made = inputs.target.values[..., column][inputs.target.driven]
+    if made.min() < 0.0 or made.max() > 1.0:
         remedy = "give successes, or scores as shares of the best"
         raise ScoresError(f"--sequential: {metric.name} goes beyond 0 and 1; {remedy}")
     if rounds < 2:
         raise ScoresError("--sequential: takes a row per rollout on the target; there is one row an agent")
     if is_sorted(inputs.target, column):
         raise ScoresError(f"--sequential: {SORTED}; give rollouts in the order in which they were made")
-    foretold = np.array([row.mean() for row in _rollouts(inputs.proxy, column, metric.direction)])
+    foretold = np.array([row.mean() for row in _scores(inputs.proxy, column, metric.direction)])
     outcomes = np.stack([row[:rounds] for row in values])[None]
     bet = foretold if foretold.min() >= 0.0 and foretold.max() <= 1.0 else None
     wealth = wealth_of(outcomes, bet)[0]
@@ -157,12 +158,14 @@ def sequential_test(inputs: Comparison, column: int = 0, *, seed: int = 0) -> Se
     rng = np.random.default_rng(seed)
     bets = {"with proxy": bet, "without proxy": None}
     expected = {name: expected_rounds(rates, each, rng) for name, each in bets.items()}
-    independent = float(independence(inputs.target, column).min())
+    independent = min(len(row) / int(count) for row, count in zip(values, inputs.target.counts, strict=True))
     return Sequential(winner, at, rounds, evidence, threshold, expected, independent)
 
 
-def _rollouts(table: ScoreTable, column: int, direction: str) -> list[Floats]:
-    """Each agent's scores in the order of the table, more being better."""
+def _scores(table: ScoreTable, column: int, direction: str) -> list[Floats]:
+    """Each agent's scores, start by start in the order of the table, more being better; of one start alone its repeats."""
+    starts = by_start(table)
+    table = starts if len(starts.episodes) > 1 else table
     rows = [row[driven] for row, driven in zip(table.values[..., column], table.driven, strict=True)]
     return rows if direction == "max" else [1.0 - row for row in rows]
 

@@ -15,13 +15,12 @@ from proxytune.scores import Metric, ScoreTable
 from proxytune.usefulness import Sequential, assess, assess_each, select_proxy
 
 
-def test_a_sequential_test_is_doubted_where_repeats_of_a_start_are_alike():
-    found = Sequential("a", 7, 60, {"a": 25.0, "b": 0.1}, 20.0, {}, independent=0.1)
-    assert sequential_sentence(found).startswith(
-        "a is shown to be the best, after 7 of 60 rollouts of each agent; but "
+def test_a_sequential_test_counts_rollouts_or_where_they_are_repeated_starts():
+    found = Sequential("a", 7, 60, {"a": 25.0, "b": 0.1}, 20.0, {}, independent=1.0)
+    assert sequential_sentence(found) == "a is shown to be the best, after 7 of 60 rollouts of each agent"
+    assert "7 of 60 starts, the repeats of one being one score, of" in sequential_sentence(
+        replace(found, independent=0.1)
     )
-    assert "only 10 % of rollouts count as independent" in sequential_sentence(found)
-    assert "but" not in sequential_sentence(replace(found, independent=0.8))
 
 
 M = (Metric("distance"),)

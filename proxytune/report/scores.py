@@ -161,7 +161,6 @@ def _tables(assessments: Assessments, selection: Selection | None, target: str) 
         (PRPV.name, str(prpv.value), span, better, f"{PRPV.meaning} to {prpv.range[1]}"),
         ("  normalised", _number(prpv.normalised), "", better, "0 to 1"),
         ("  flipped pairs", str(len(prpv.pairs)), "", better, ", ".join(flips)),
-        ("  expected", _number(inner.expected), "", better, "mean over resampled episodes"),
         (f"  {noise.title}", _number(noise.value), short_span(noise.low, noise.high), "", noise.meaning),
         ("  chance", _number(random.mean), f"± {random.deviation:.3g}", "", by_chance),
     ]

@@ -20,7 +20,7 @@ from proxytune.errors import InputError, ScoresError
 from proxytune.scores import Metric, ScoreTable, score_cautions
 from proxytune.settings import check_whole
 from proxytune.usefulness import resampling
-from proxytune.usefulness.comparison import Comparison, compare, repeats
+from proxytune.usefulness.comparison import Comparison, compare, fewest_starts, repeats
 from proxytune.usefulness.decision import ASKED, Asked, Decision, Difference, Together, chosen, compare_all, decide
 from proxytune.usefulness.expectation import Expectation
 from proxytune.usefulness.noise import Chance, NoiseFloor, SuccessRates, chance, noise_floor, success_rates
@@ -302,14 +302,8 @@ def select_proxy(
     deviation = differences.std(axis=1)
     centred = np.abs(differences - differences.mean(axis=1, keepdims=True))
     studentised = centred / np.where(deviation > 0, deviation, np.inf)[:, None]
-    fewest = {name: min(_starts(side.proxy), _starts(side.target)) for name, side in inputs.items()}
+    fewest = {name: fewest_starts(side) for name, side in inputs.items()}
     starts = np.array([min(fewest[name] for name in pair) for pair in pairs])
     half = np.quantile(studentised.max(axis=0), resampling.CONFIDENCE) * deviation * starts / (starts - 1)
     rows = zip(pairs, observed, half, strict=True)
     return Selection(ranking, tuple(Difference(*pair, int(v), float(v - h), float(v + h)) for pair, v, h in rows))
-
-
-def _starts(table: ScoreTable) -> int:
-    """The fewest starts of an agent; where one has a single start, the fewest repeats."""
-    starts = int((repeats(table) > 0).sum(axis=1).min())
-    return starts if starts > 1 else int(table.counts.min())

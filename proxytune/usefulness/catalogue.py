@@ -15,6 +15,7 @@ from proxytune.arrays import Floats
 from proxytune.errors import InputError
 from proxytune.scores import Metric
 from proxytune.usefulness.assessment import Assessment
+from proxytune.usefulness.comparison import fewest_starts
 from proxytune.usefulness.pairs import prpv_of_means
 from proxytune.usefulness.predictivity import ppv_of_means, weights_of_spread
 from proxytune.usefulness.resampling import Ends, bootstrap_means, in_blocks, interval_around
@@ -98,7 +99,11 @@ class Measure:
         if assessment.intervals is not None:
             means = bootstrap_means(inputs, resamples=assessment.prpv_interval.resamples, seed=assessment.seed)
             resampled = in_blocks(by_metric, *means).T
-            ends = [interval_around(float(value), one) for value, one in zip(found, resampled, strict=True)]
+            starts, (_, on_target), sign = fewest_starts(inputs), inputs.means, 1 if self.lower_is_better else -1
+            # None is better than a proxy that scores as the target does.
+            scales = [sorted((float(best), sign * np.inf)) for best in by_metric(on_target, on_target)]
+            rows = zip(found, resampled, scales, strict=True)
+            ends = [interval_around(float(value), one, starts, (low, high)) for value, one, (low, high) in rows]
         values = [None if np.isnan(value) else float(value) for value in found]
         return dict(zip(names, map(Measured, values, ends), strict=True))
 

@@ -120,6 +120,13 @@ def repeats(table: ScoreTable) -> Whole:
     return np.stack([np.bincount(places[driven], minlength=starts) for driven in table.driven])
 
 
+def fewest_starts(inputs: Comparison) -> int:
+    """The fewest starts of an agent on either side; where one has a single start, the fewest repeats."""
+    starts = [int((repeats(side) > 0).sum(axis=1).min()) for side in (inputs.proxy, inputs.target)]
+    episodes = [fewest for fewest, _ in inputs.episodes]
+    return min(own if own > 1 else count for own, count in zip(starts, episodes, strict=True))
+
+
 def is_repeated(table: ScoreTable) -> bool:
     """True if a domain can be held to itself: each start has two repeats or more, and each agent drove one twice."""
     labels, driven = np.bincount(start_places(table)), repeats(table)

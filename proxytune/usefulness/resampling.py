@@ -1,8 +1,13 @@
 """Bootstrap over episodes: what the measures would be, had the same agents driven other episodes.
 
-Starts are drawn with replacement, each with all its repeats, and a measure of the mean scores of every draw has a
-central 95 % interval, widened to hold its value. Where all agents drove the same episodes they share the draws; where
-both domains have the same starts, so do these.
+Starts are drawn with replacement, each with all its repeats. Where all agents drove the same episodes they share the
+draws; where both domains have the same starts, so do these. A draw has the episodes' own noise and that of drawing: it
+breaks more orders than other episodes would, above all of many agents. So the interval lies about the value, which is
+unbiased:
+
+    value + √(n/(n − 1)) (central 95 % of the draws − their mean),    n the fewest starts
+
+√(n/(n − 1)) is what a bootstrap of n starts lacks. The interval ends where the scale does, and holds the value.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -12,7 +17,7 @@ import numpy as np
 
 from proxytune.arrays import Flags, Floats, Whole
 from proxytune.scores import Metric, ScoreTable
-from proxytune.usefulness.comparison import Comparison, start_of, start_places
+from proxytune.usefulness.comparison import Comparison, fewest_starts, start_of, start_places
 from proxytune.usefulness.pairs import prpv_of_means
 from proxytune.usefulness.predictivity import Ppv, kendall_of_means, mmrv_of_means, pearson_of_means, ppv_of_means
 
@@ -32,11 +37,15 @@ class PrpvInterval:
     """
 
     value: int  # PRPV of the episodes as they are
-    expected: float | None  # mean over resamples, a smooth companion to the integer; None if there is no interval
     low: float | None  # lower end, at most the value; None if there is no interval
     high: float | None  # upper end, at least the value; None if there is no interval
     resamples: int  # how many were drawn
     reason: str = ""  # why there is no interval, empty if there is one
+
+    @property
+    def expected(self) -> float | None:
+        """The mean PRPV that the interval covers: the value is its unbiased estimate; None if there is no interval."""
+        return None if self.low is None else float(self.value)
 
 
 def why_not_repeated(inputs: Comparison) -> str:
@@ -148,20 +157,24 @@ def prpv_interval(inputs: Comparison, means: Means | None) -> PrpvInterval:
     """The interval of PRPV from mean scores of resampled episodes; without one where there are none."""
     value = round(float(prpv_of_means(*inputs.means, inputs.metrics)))
     if means is None:
-        return PrpvInterval(value, None, None, None, 0, why_not_repeated(inputs))
-    values = prpv_in_blocks(*means, inputs.metrics)
-    low, high = interval(values)
-    return PrpvInterval(value, float(values.mean()), min(low, value), max(high, value), len(values))
+        return PrpvInterval(value, None, None, 0, why_not_repeated(inputs))
+    values, agents = prpv_in_blocks(*means, inputs.metrics), len(inputs.agents)
+    ends = interval_around(value, values, fewest_starts(inputs), (0.0, agents * (agents - 1.0)))
+    # A bound in whole pairs, rounded outwards.
+    low, high = (float(np.floor(ends[0])), float(np.ceil(ends[1]))) if ends else (None, None)
+    return PrpvInterval(value, low, high, len(values))
 
 
 Ends = tuple[float, float]
+ERROR, CORRELATION = (0.0, np.inf), (-1.0, 1.0)
+"""Scales of measures."""
 UNDEFINED_SHARE = 0.05
 """A measure undefined in more of the resamples than this gets no interval."""
 
 
 @dataclass(frozen=True)
 class Intervals:
-    """Percentile bootstrap intervals of the measures beside PRPV, each holding its value; None where one is undefined.
+    """Bootstrap intervals of the measures beside PRPV, each holding its value; None where one is undefined.
 
     Like PRPV's they are of what such tables score: noise adds errors and wrong orders that endless episodes had not.
     """
@@ -177,30 +190,34 @@ def intervals(*, inputs: Comparison, error: Ppv, means: Means | None) -> Interva
     if means is None:
         return None
     weights = np.array([error.beta[metric.name] or 0.0 for metric in inputs.metrics])
-    each, ppv = inputs.target.means.size, None
+    each, starts, ppv = inputs.target.means.size, fewest_starts(inputs), None
     if error.value is not None:
-        ppv = interval_around(error.value, in_blocks(lambda p, t: ppv_of_means(p, t, weights), *means, numbers=each))
+        values = in_blocks(lambda p, t: ppv_of_means(p, t, weights), *means, numbers=each)
+        ppv = interval_around(error.value, values, starts, ERROR)
 
-    def per_metric(measure: Callable[[Floats, Floats], Floats], numbers: int | None = None) -> dict[str, Ends | None]:
+    def per_metric(
+        measure: Callable[[Floats, Floats], Floats], scale: Ends, numbers: int | None = None
+    ) -> dict[str, Ends | None]:
         resampled = in_blocks(measure, *means, numbers=numbers).T
         rows = zip(inputs.metrics, measure(*inputs.means), resampled, strict=True)
-        return {metric.name: interval_around(float(value), values) for metric, value, values in rows}
+        return {metric.name: interval_around(float(value), values, starts, scale) for metric, value, values in rows}
 
     return Intervals(
         ppv=ppv,
-        srcc=per_metric(pearson_of_means, each),
-        kendall_tau=per_metric(kendall_of_means),
-        mmrv=per_metric(lambda p, t: mmrv_of_means(p, t, inputs.metrics)),
+        srcc=per_metric(pearson_of_means, CORRELATION, each),
+        kendall_tau=per_metric(kendall_of_means, CORRELATION),
+        mmrv=per_metric(lambda p, t: mmrv_of_means(p, t, inputs.metrics), ERROR),
     )
 
 
-def interval_around(value: float, resampled: Floats) -> Ends | None:
-    """The interval of resamples, the undefined left out, widened to hold a value if that is defined.
+def interval_around(value: float, resampled: Floats, starts: int, scale: Ends = (-np.inf, np.inf)) -> Ends | None:
+    """The interval of resamples of so many starts, the undefined left out, about a value on this scale.
 
-    None if too many are undefined.
+    None if the value is undefined, or too many resamples are.
     """
     undefined = np.isnan(resampled)
-    if undefined.mean() > UNDEFINED_SHARE:
+    if np.isnan(value) or undefined.mean() > UNDEFINED_SHARE:
         return None
-    low, high = interval(resampled[~undefined])
-    return float(np.fmin(low, value)), float(np.fmax(high, value))
+    known, wider = resampled[~undefined], np.sqrt(starts / (starts - 1))
+    low, high = np.clip(value + wider * (np.array(interval(known)) - known.mean()), *scale)
+    return min(float(low), value), max(float(high), value)

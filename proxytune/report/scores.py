@@ -80,10 +80,7 @@ def score_text(assessments: Assessments, selection: Selection | None, left_out: 
         notes += [f"decision: {line}" for line in decision.decision_table(assessment, target).notes]
     else:
         notes += [f"decision: {line}" for line in decision.choices_sentences(assessments, selection, target)]
-    noise, floor = next(iter(assessments.values())).noise_floor, []
-    if selection is not None and noise.value is not None:
-        ends = short_span(noise.low, noise.high)
-        floor = [f"{noise.title} {short(noise.value)}, 95 % interval {ends}: {noise.meaning}"]
+    floor = _floors(assessments) if selection is not None else []
     tables = map(table_text, _tables(assessments, selection, target))
     sentence = score_sentence(assessments, selection, target=target)
     return group_texts(f"{sentence}\n", *tables, *floor, *notes, *note_texts(left_out))
@@ -91,16 +88,32 @@ def score_text(assessments: Assessments, selection: Selection | None, left_out: 
 
 def _remarks(assessments: Assessments, note: str = "") -> list[str]:
     """Cautions, then notes, each once, with the proxies that it is said of, where it is not all."""
-    remarks = list[str]()
-    for kind, lines in (("beware", "cautions"), (note, "notes")):
-        said: dict[str, list[str]] = {}
-        for name, one in assessments.items():
-            for line in getattr(one, lines):
-                said.setdefault(line, []).append(name)
-        for line, names in said.items():
-            whose = "" if len(names) == len(assessments) else f" ({', '.join(names)})"
-            remarks.append(f"{kind}{whose}: {line}".removeprefix(": ").lstrip())
-    return remarks
+    kinds = (("beware", "cautions"), (note, "notes"))
+    said = [(kind, {name: getattr(one, lines) for name, one in assessments.items()}) for kind, lines in kinds]
+    return [
+        f"{kind}{whose}: {line}".removeprefix(": ").lstrip() for kind, each in said for line, whose in _said_of(each)
+    ]
+
+
+def _floors(assessments: Assessments) -> list[str]:
+    """What a perfect proxy scores, or halves of the target, each once: it depends on the starts of a proxy."""
+    noises = {name: one.noise_floor for name, one in assessments.items()}
+    lines = {
+        name: [f"{short(one.value)}, 95 % interval {short_span(one.low, one.high)}: {one.meaning}"]
+        for name, one in noises.items()
+        if one.value is not None
+    }
+    titles = {line: noises[name].title for name, (line,) in lines.items()}
+    return [f"{titles[line]}{whose} {line}" for line, whose in _said_of(lines)]
+
+
+def _said_of(each: Mapping[str, Sequence[str]]) -> list[tuple[str, str]]:
+    """Each line once, and in brackets the proxies that it is said of, where it is not all."""
+    said: dict[str, list[str]] = {}
+    for name, lines in each.items():
+        for line in lines:
+            said.setdefault(line, []).append(name)
+    return [(line, "" if len(names) == len(each) else f" ({', '.join(names)})") for line, names in said.items()]
 
 
 def score_view(

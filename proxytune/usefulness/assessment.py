@@ -22,8 +22,8 @@ from proxytune.settings import check_whole
 from proxytune.usefulness import resampling
 from proxytune.usefulness.comparison import Comparison, compare, fewest_starts, repeats
 from proxytune.usefulness.decision import ASKED, Asked, Decision, Difference, Together, chosen, compare_all, decide
-from proxytune.usefulness.expectation import Expectation
-from proxytune.usefulness.noise import Chance, NoiseFloor, SuccessRates, chance, noise_floor, success_rates
+from proxytune.usefulness.expectation import Expectation, noise_floor
+from proxytune.usefulness.noise import Chance, NoiseFloor, SuccessRates, chance, success_rates
 from proxytune.usefulness.pairs import Prpv, prpv, prpv_of_means
 from proxytune.usefulness.predictivity import Correlation, Mmrv, Ppv, kendall_tau, mmrv, ppv, srcc
 from proxytune.usefulness.saving import Saving, saving_of
@@ -45,7 +45,7 @@ PERFECT = (
 HALVES = (
     "PRPV is no higher than two halves of the target's episodes may score against each other (95 %); halves hold other "
     "starts, so this does not show that the proxy is perfect; to know, measure the target at least twice from each "
-    "start (episodes START/REPEAT)"
+    "start (episodes START/REPEAT), and the proxy from the same starts"
 )
 
 
@@ -219,7 +219,7 @@ def assess(
         kendall_tau=kendall_tau(inputs),
         mmrv=mmrv(inputs),
         intervals=resampling.intervals(inputs=inputs, error=error, means=means),
-        noise_floor=floor or noise_floor(target=inputs.target, metrics=metrics, seed=seed),
+        noise_floor=floor or noise_floor(inputs, seed),
         chance=chance(inputs, permutations=resamples, seed=seed),
         seed=seed,
         asked=asked,

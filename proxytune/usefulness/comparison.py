@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from proxytune.arrays import Flags, Floats, Whole
+from proxytune.arrays import Floats, Whole
 from proxytune.errors import ScoresError
 from proxytune.scores import Metric, ScoreTable
 from proxytune.settings import alike_caution
@@ -127,14 +127,6 @@ def fewest_starts(inputs: Comparison) -> int:
     return min(own if own > 1 else count for own, count in zip(starts, episodes, strict=True))
 
 
-def is_repeated(table: ScoreTable) -> bool:
-    """True if a domain can be held to itself: each start has two repeats or more, and each agent drove one twice."""
-    labels, driven = np.bincount(start_places(table)), repeats(table)
-    # A start that one agent alone drove is no start but a label of that agent's own.
-    shared = (driven > 0).sum(axis=0) >= 2
-    return bool(labels.min() >= 2 and shared.all() and (driven >= 2).any(axis=1).all())
-
-
 def by_start(table: ScoreTable) -> ScoreTable:
     """Average over the repeats of each start: the same scores with one episode per start."""
     places = start_places(table)
@@ -167,20 +159,3 @@ def independence(table: ScoreTable, column: int) -> Floats:
     whole = outer + (usual - 1.0) * inner
     icc = min(max((outer - inner) / whole, 0.0), 1.0) if whole > 0.0 else 1.0
     return np.asarray(1.0 / (1.0 + (alike - 1.0) * icc), dtype=np.float64)
-
-
-def split_repeats(driven: Flags, places: Whole, keys: Floats) -> tuple[Flags, Flags]:
-    """Split episodes into two sets (agents, splits, episodes) that hold the same starts, each as often.
-
-    Where an agent has an odd number of repeats of a start, one is left out. Agents split the same repeats alike: the
-    lower half of the `keys`, random numbers (splits, episodes), is the first set's.
-    """
-    first, second = np.zeros((2, len(driven), *keys.shape), dtype=np.bool_)
-    for place in range(places.max() + 1):
-        columns = np.flatnonzero(places == place)
-        own = driven[:, None, columns]
-        rank = np.where(own, keys[:, columns], np.inf).argsort(axis=-1).argsort(axis=-1)
-        size = own.sum(axis=-1, keepdims=True) // 2
-        first[..., columns] = rank < size
-        second[..., columns] = (rank >= size) & (rank < 2 * size)
-    return first, second

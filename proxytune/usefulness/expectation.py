@@ -22,17 +22,19 @@ from typing import NamedTuple
 
 import numpy as np
 
-from proxytune.arrays import NORMAL_95, Flags, Floats
+from proxytune.arrays import NORMAL_95, Flags, Floats, Whole
 from proxytune.scores import Metric, ScoreTable
-from proxytune.usefulness.comparison import Comparison, compare, start_places
+from proxytune.usefulness.comparison import Comparison, by_start, compare, start_places
 from proxytune.usefulness.decision import Difference
-from proxytune.usefulness.noise import NoiseFloor
+from proxytune.usefulness.noise import NoiseFloor, floor_of_halves
 from proxytune.usefulness.predictivity import ppv, ppv_of_means
-from proxytune.usefulness.resampling import interval, prpv_in_blocks
+from proxytune.usefulness.resampling import BLOCK, interval, prpv_in_blocks
 
 NEAREST = 24
 """Pairs most like a cell, one of which is drawn to repeat it."""
 DRAWS = 400
+MOST_DONORS = 2000
+"""Of a target's own repeats so many tell of its noise; more take long."""
 ATOM = 0.05
 """A value that more than this share of all cells have is one that agents end up at, as the time limit."""
 OTHER_ATOMS = 10.0
@@ -89,17 +91,22 @@ class Donors:
         many share; else its difference, within the range of all.
         """
         own, before, after = (self._atoms(each) for each in (cells, self.first, self.second))
-        apart = np.abs(self._ranks(cells)[:, None] - self._ranks(self.first)).sum(axis=-1)
-        other = ~_same(own[:, None], before).all(axis=-1)
-        # Equal ones in random order.
-        apart += OTHER_ATOMS * other + 1e-6 * rng.random(apart.shape)
-        count = min(NEAREST, len(self.first))
-        near = np.argpartition(apart, count - 1, axis=1)[:, :count]
-        chosen = near[np.arange(len(cells)), rng.integers(count, size=(draws, len(cells)))]
+        size = max(1, BLOCK // self.first.size)
+        rows = [slice(start, start + size) for start in range(0, len(cells), size)]
+        near = np.concatenate([self._nearest(cells[some], own[some], before, rng) for some in rows])
+        chosen = near[np.arange(len(cells)), rng.integers(near.shape[1], size=(draws, len(cells)))]
         turned = np.asarray(~_same(before, after).all(axis=-1))[chosen]
         moved = np.clip(cells + self.second[chosen] - self.first[chosen], self._sorted[0], self._sorted[-1])
         moved = np.where(np.isnan(own), moved, cells)
         return np.where(turned[..., None], self.second[chosen], moved)
+
+    def _nearest(self, cells: Floats, atoms: Floats, before: Floats, rng: np.random.Generator) -> Whole:
+        """The places of the pairs most like each cell, equal ones in random order."""
+        apart = np.abs(self._ranks(cells)[:, None] - self._ranks(self.first)).sum(axis=-1)
+        other = ~_same(atoms[:, None], before).all(axis=-1)
+        apart += OTHER_ATOMS * other + 1e-6 * rng.random(apart.shape)
+        count = min(NEAREST, len(self.first))
+        return np.argpartition(apart, count - 1, axis=1)[:, :count]
 
 
 def _same(one: Floats, other: Floats) -> Flags:
@@ -148,13 +155,7 @@ def expect(
     means, known = sides[0].target.means, len(donors.first) > 0
     proxies = np.stack([side.proxy.means for side in sides])
     draws = [np.nanmean(_again(one.proxy, donors, rng), axis=2) for one in sides] if known else []
-    of_target = donors
-    if donors.still:  # The target's starts driven twice, or where there are none its episodes from different starts
-        scored, places = sides[0].target.values, start_places(sides[0].target)
-        two = np.array([(a, b) for a in range(len(places)) for b in range(a)], dtype=np.intp).reshape(-1, 2)
-        alike = two[places[two[:, 0]] == places[two[:, 1]]]
-        chosen = (alike if len(alike) else two).T
-        of_target = donors_of([np.moveaxis(scored[:, chosen], 1, 0)], scored.shape[-1])
+    of_target = _donors_within(sides[0].target) if donors.still else donors
     perfect = _perfect(sides[0], of_target, rng) if len(of_target.first) else None
     weights = ppv(sides[0]).beta
     beta = np.array([weights[metric.name] or 0.0 for metric in metrics])
@@ -166,6 +167,33 @@ def expect(
     floor = NoiseFloor("same starts", *level) if level else unknown
     error = all_of(lambda it: ppv_of_means(it, means, beta), np.inf)[0] if beta.any() else None
     return Expectation(counted, error, len(fresh), deviation, floor)
+
+
+def noise_floor(inputs: Comparison, seed: int = 0) -> NoiseFloor:
+    """What a perfect proxy, driven as this one was, scores against this target.
+
+    From the target's starts, if it has two repeats of each, the target's cells are repeated. From other starts two
+    halves of the target's are compared.
+    """
+    in_proxy, on_target = (int(np.bincount(start_places(side)).min()) for side in (inputs.proxy, inputs.target))
+    if not inputs.paired or on_target < 2:
+        return floor_of_halves(target=inputs.target, metrics=inputs.metrics, seed=seed)
+    rng, donors = np.random.default_rng(seed), _donors_within(inputs.target)
+    some = rng.permutation(len(donors.first))[:MOST_DONORS]
+    donors, times = Donors(donors.first[some], donors.second[some]), min(in_proxy, on_target)
+    perfect = np.mean([_perfect(inputs, donors, rng, times) for _ in range(times)], axis=0)
+    known = np.broadcast_to(by_start(inputs.target).means, perfect.shape)
+    levels = prpv_in_blocks(perfect, known, inputs.metrics)
+    return NoiseFloor("same starts", float(levels.mean()), *interval(levels))
+
+
+def _donors_within(target: ScoreTable) -> Donors:
+    """The target's starts driven twice, or where there are none its episodes from different starts."""
+    places = start_places(target)
+    two = np.array([(a, b) for a in range(len(places)) for b in range(a)], dtype=np.intp).reshape(-1, 2)
+    alike = two[places[two[:, 0]] == places[two[:, 1]]]
+    chosen = (alike if len(alike) else two).T
+    return donors_of([np.moveaxis(target.values[:, chosen], 1, 0)], target.values.shape[-1])
 
 
 def expected_differences(proxies: Mapping[str, Expectation]) -> tuple[Difference, ...]:
@@ -221,8 +249,11 @@ def _again(table: ScoreTable, donors: Donors, rng: np.random.Generator) -> Float
     return values
 
 
-def _perfect(sides: Comparison, donors: Donors, rng: np.random.Generator) -> Floats:
-    """Mean scores of a perfect proxy: the target's cells repeated, each start once, by one of its repeats."""
+def _perfect(sides: Comparison, donors: Donors, rng: np.random.Generator, times: int = 1) -> Floats:
+    """Mean scores of a perfect proxy: the target's cells repeated, each start once, by one of its repeats.
+
+    So many times that their mean is to be off the target's as that of as many new repeats.
+    """
     places = start_places(sides.target)
     count = int(places.max()) + 1
     keys = rng.random((DRAWS, len(places)))
@@ -232,9 +263,9 @@ def _perfect(sides: Comparison, donors: Donors, rng: np.random.Generator) -> Flo
         drawn = rng.integers(count, size=(DRAWS, len(sides.proxy.episodes)))
         each = np.take_along_axis(each, drawn, axis=1)
     values = _again(sides.target, donors, rng)
-    # A new repeat of a cell is off the mean of R by (1 + 1/R) of its variance, one of the R by (1 − 1/R), and a change
-    # is 2: so one in R changes.
-    alike = rng.random(values.shape[:3]) >= 1.0 / np.bincount(places)[places]
+    # The mean of n new repeats of a cell is off that of R by (1/n + 1/R) of its variance, that of n drawn of the R by
+    # (1 − 1/R)/n, and a change is 2: so (n + 1)/2 in R change.
+    alike = rng.random(values.shape[:3]) >= (times + 1) / 2.0 / np.bincount(places)[places]
     values = np.where(alike[..., None], sides.target.values, values)
     chosen = np.take_along_axis(values, each[:, None, :, None], axis=2)
     # An agent that was driven from none of the starts drawn keeps its mean.

@@ -23,9 +23,6 @@ from proxytune.usefulness.comparison import (
     by_start,
     compare,
     independence,
-    is_repeated,
-    split_repeats,
-    start_places,
 )
 from proxytune.usefulness.pairs import prpv_of_means, stand
 
@@ -41,12 +38,11 @@ MEANINGS: dict[FloorKind, str] = {
 class NoiseFloor:
     """PRPV of one domain against itself."""
 
-    # "same starts": two sets of episodes from the same starts under other placement noise, what a perfect proxy
-    # would score. "halves": halves of the episodes, which hold other starts; no more than an upper bound of that.
-    # "none": there is neither
+    # "same starts": from the same starts under other placement noise, what a perfect proxy would score.
+    # "halves": halves of the starts, which are other ones; no more than an upper bound of that. "none": neither
     kind: FloorKind
-    value: float | None = None  # of the means, or the mean over splits; None if there is no noise floor
-    low: float | None = None  # lower end of the central 95 % of resamples or splits; None if there is no noise floor
+    value: float | None = None  # the mean over draws or splits; None if there is no noise floor
+    low: float | None = None  # lower end of the central 95 % of draws or splits; None if there is no noise floor
     high: float | None = None  # upper end of the same; None if there is no noise floor
     reason: str = ""  # why there is no noise floor, empty if there is one
 
@@ -61,27 +57,21 @@ class NoiseFloor:
         return MEANINGS[self.kind]
 
 
-def noise_floor(*, target: ScoreTable, metrics: Sequence[Metric], splits: int = 200, seed: int = 0) -> NoiseFloor:
-    """Compare the target with itself, by two sets of its own episodes that are drawn at random many times.
+def floor_of_halves(*, target: ScoreTable, metrics: Sequence[Metric], splits: int = 200, seed: int = 0) -> NoiseFloor:
+    """Compare two halves of the target's starts, drawn at random many times; of one start, of its repeats.
 
-    Where every start has repeats (episodes labelled START/REPEAT), both sets hold the same starts, each with half of
-    its repeats; so the floor is on the high side by what half as many repeats are noisier. Otherwise the sets are
-    halves of the episodes, and with them of the starts. Where all agents drove the same episodes, all are split alike.
+    Where all agents drove the same starts, all are split alike.
     """
-    chosen = compare(proxy=target, target=target, metrics=metrics).target
-    if reason := resampling.too_few(chosen, "on the target"):
+    if reason := resampling.too_few(target, "on the target"):
         return NoiseFloor("none", reason=reason)
-    same_starts = is_repeated(chosen)
-    rng, places = np.random.default_rng(seed), start_places(chosen)
-    keys = rng.random((splits, len(chosen.episodes))) if same_starts else None
-    means = []
+    starts, rng, means = by_start(target), np.random.default_rng(seed), []
+    chosen = starts if starts.counts.min() > 1 else target
     for rows, driven in resampling.agent_blocks(chosen, splits):
-        sets = split_halves(driven, rng, splits) if keys is None else split_repeats(driven, places, keys)
+        sets = split_halves(driven, rng, splits)
         means.append([resampling.counted_means(chosen.values[rows], own) for own in sets])
     first, second = (np.concatenate(parts, axis=1) for parts in zip(*means, strict=True))
     values = resampling.prpv_in_blocks(first, second, metrics)
-    kind: FloorKind = "same starts" if same_starts else "halves"
-    return NoiseFloor(kind, float(values.mean()), *resampling.interval(values))
+    return NoiseFloor("halves", float(values.mean()), *resampling.interval(values))
 
 
 def floor_of_repeats(

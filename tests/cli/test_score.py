@@ -115,6 +115,14 @@ def test_halves_are_called_halves_repeats_of_starts_a_noise_floor_and_a_constant
     text = shown(*base, "twice.csv", *METRIC)
     assert "target against itself from the same" in text
     assert "halves" not in text
+    head, *rest = SIM.splitlines()
+    moved = [
+        ",".join([agent, f"other{episode}", scores]) for agent, episode, scores in (row.split(",", 2) for row in rest)
+    ]
+    Path("moved.csv").write_text("\n".join([head, *moved]) + "\n")
+    text = shown("--proxy", "moved.csv", *base, "twice.csv", *METRIC)
+    assert "noise floor (sim) 0" in text
+    assert "halves (moved)" in text
     loose = document(*base, "twice.csv", *METRIC, "--unpaired")
     assert (loose["noise_floor_kind"], loose["at_noise_floor"]) == ("halves", None)
     for file in ("flat.csv", "again.csv"):

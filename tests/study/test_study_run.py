@@ -34,8 +34,7 @@ from proxytune.study.pruning import pruning_rule
 from proxytune.study.run import stopped
 from proxytune.study.settings import StopRules
 from proxytune.study.study_run import longest_first
-from proxytune.usefulness import compare
-from proxytune.usefulness.noise import noise_floor
+from proxytune.usefulness import assess, compare
 from proxytune.usefulness.pairs import prpv
 from proxytune.usefulness.predictivity import ppv
 
@@ -307,8 +306,8 @@ def test_the_number_of_jobs_changes_nothing_and_the_seed_and_the_model_do(make_s
 def test_a_target_of_repeats_has_a_floor_and_a_failing_episode_leaves_no_table(make_study, model):
     settings = read_study_settings(make_study())
     once, twice = (measure_agents(settings, model, 1001, Silent(), repeats) for repeats in (1, 2))
-    assert noise_floor(target=twice, metrics=settings.metrics).kind == "same starts"
-    assert noise_floor(target=once, metrics=settings.metrics).kind == "halves"
+    assert assess(proxy=once, target=twice, metrics=settings.metrics).noise_floor.kind == "same starts"
+    assert assess(proxy=once, target=once, metrics=settings.metrics).noise_floor.kind == "halves"
     settings = read_study_settings(make_study(domain={"faults": '["agent3:1:raises"]'}))
     with pytest.raises(EpisodeError, match="agent 'agent3' failed from start 1"):
         measure_agents(settings, model, 1, Silent())

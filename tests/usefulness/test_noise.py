@@ -10,7 +10,8 @@ from score_tables import of_means, table_of
 
 from proxytune.scores import Metric, ScoreTable, read_domains
 from proxytune.usefulness import assess, chance, compare, floor_of_repeats, prpv_of_means
-from proxytune.usefulness.noise import noise_floor, split_halves, success_rates
+from proxytune.usefulness.expectation import noise_floor
+from proxytune.usefulness.noise import floor_of_halves, split_halves, success_rates
 
 M = (Metric("m"), Metric("n"))
 FIRST = M[:1]
@@ -57,8 +58,8 @@ def test_halves_are_disjoint_for_agents_alike_and_without_a_second_episode_there
     assert not first[1, :, :2].any()
     assert len(np.unique(first[2], axis=0)) > 1
     starts = np.random.default_rng(0).normal(size=(1, 4))
-    assert noise_floor(target=table_of(starts + np.arange(3.0)[:, None]), metrics=FIRST).high == 0.0
-    result = noise_floor(target=table_of(np.arange(3.0)[:, None]), metrics=FIRST)
+    assert floor_of_halves(target=table_of(starts + np.arange(3.0)[:, None]), metrics=FIRST).high == 0.0
+    result = floor_of_halves(target=table_of(np.arange(3.0)[:, None]), metrics=FIRST)
     assert (result.value, result.kind) == (None, "none")
     assert "each agent has one episode on the target" in result.reason
     (one, two), _ = planted(5)
@@ -68,7 +69,8 @@ def test_halves_are_disjoint_for_agents_alike_and_without_a_second_episode_there
 @given(seed=st.integers(0, 10_000), starts=st.integers(2, 5), repeats=st.integers(2, 5))
 def test_without_placement_noise_a_domain_has_a_floor_of_zero(seed, starts, repeats):
     values = np.random.default_rng(seed).normal(size=(6, starts))
-    result = noise_floor(target=repeated(values.repeat(repeats, axis=1), repeats), metrics=FIRST, splits=20)
+    target = repeated(values.repeat(repeats, axis=1), repeats)
+    result = noise_floor(compare(proxy=target, target=target, metrics=FIRST))
     assert (result.kind, result.value, result.high) == ("same starts", 0.0, 0.0)
     same = floor_of_repeats(domain=table_of(values), again=table_of(values), metrics=FIRST, resamples=20)
     assert (same.kind, same.value, same.low, same.high) == ("same starts", 0.0, 0.0, 0.0)
@@ -76,8 +78,9 @@ def test_without_placement_noise_a_domain_has_a_floor_of_zero(seed, starts, repe
 
 def test_the_floor_lies_far_below_that_of_halves_with_strong_starts_and_is_what_a_perfect_proxy_scores():
     (one, two), _ = planted(1)
-    halves = noise_floor(target=table_of(interleaved(one, two)), metrics=FIRST)
-    floor = noise_floor(target=repeated(interleaved(one, two), 2), metrics=FIRST)
+    halves = floor_of_halves(target=table_of(interleaved(one, two)), metrics=FIRST)
+    target = repeated(interleaved(one, two), 2)
+    floor = noise_floor(compare(proxy=table_of(one), target=target, metrics=FIRST))
     again = floor_of_repeats(domain=table_of(one), again=table_of(two), metrics=FIRST)
     assert (halves.kind, floor.kind, again.kind) == ("halves", "same starts", "same starts")
     assert 0.0 < floor.value < 0.4 * halves.value
@@ -95,6 +98,28 @@ def test_the_floor_lies_far_below_that_of_halves_with_strong_starts_and_is_what_
         within.append(perfect <= floor.high)
     assert np.mean(values) == pytest.approx(np.mean(scored), rel=0.15)
     assert np.mean(within) >= 0.93
+
+
+@pytest.mark.parametrize(("others", "once"), [(False, True), (False, False), (True, True)])
+def test_the_floor_holds_a_perfect_proxy_from_the_same_starts_and_halves_bound_one_from_others(others, once):
+    """Success rates; the proxy drives each start once or twice, as the target."""
+    rng, agents, starts = np.random.default_rng(41), np.linspace(0.0, 2.0, 8)[:, None], 8
+    held, above = [], []
+    for seed in range(60):
+        own = agents + rng.normal(size=(8, starts))
+        sides = [own, agents + rng.normal(size=own.shape) if others else own]
+        target, proxy = (
+            repeated((side.repeat(2, axis=1) + 0.3 * rng.normal(size=(8, 2 * starts))) > 0.5, 2) for side in sides
+        )
+        proxy = proxy.arrange(agents=proxy.agents, episodes=proxy.episodes[:: 2 if once else 1])
+        proxy = proxy.unpaired() if others else proxy
+        inputs = compare(proxy=proxy, target=target, metrics=FIRST)
+        floor, scored = noise_floor(inputs, seed), float(prpv_of_means(*inputs.means, FIRST))
+        held.append(floor.low <= scored <= floor.high)
+        above.append(scored > floor.high)
+    assert floor.kind == ("halves" if others else "same starts")
+    assert np.mean(above) <= 0.1
+    assert others or np.mean(held) >= 0.88
 
 
 def test_starts_are_paired_by_their_label_on_both_sides():
@@ -128,9 +153,9 @@ def test_an_agent_with_less_than_two_starts_driven_both_times_gives_no_floor_but
 def test_the_real_duckiebots_two_episodes_have_one_split():
     chosen = [Metric("distance"), Metric("survival_time_s")]
     real = read_domains(SCORES / "duckietown_pilot_episodes.csv", [m.name for m in chosen])["real"]
-    result = noise_floor(target=real, metrics=chosen)
+    result = floor_of_halves(target=real, metrics=chosen)
     assert (result.value, result.low, result.high) == (56.0, 56.0, 56.0)
-    loose = noise_floor(target=real.unpaired(), metrics=chosen)
+    loose = floor_of_halves(target=real.unpaired(), metrics=chosen)
     assert loose.low < loose.value < loose.high
 
 

@@ -10,7 +10,7 @@ from score_tables import bootstrap_prpv, of_means, table_of
 from proxytune.errors import ScoresError
 from proxytune.scores import Metric, ScoreTable, read_domains
 from proxytune.usefulness import assess, compare, dominance, pairs, predictivity, resampling, start_of, starts_of
-from proxytune.usefulness.comparison import by_start, in_common, is_repeated, split_repeats, start_places
+from proxytune.usefulness.comparison import by_start, in_common
 from proxytune.usefulness.pairs import FlippedPair, prpv, prpv_of_means, stand
 from proxytune.usefulness.predictivity import kendall_of_means, mmrv_of_means
 from proxytune.usefulness.resampling import bootstrap_means, draw_counts
@@ -205,11 +205,6 @@ def test_the_pilots_published_figures_come_out_exactly(metrics, published):
     assert values == published
 
 
-def split(scores, splits):
-    keys = np.random.default_rng(0).random((splits, len(scores.episodes)))
-    return split_repeats(scores.driven, start_places(scores), keys)
-
-
 def labelled(starts, repeats):
     return [f"{start}/{repeat}" for start in range(starts) for repeat in range(repeats)]
 
@@ -225,42 +220,10 @@ def test_the_start_is_what_is_before_the_last_stroke_and_more_repeats_of_it_make
     assert (copied.low, copied.high) == (once.low, once.high)
 
 
-def test_both_sets_hold_every_start_equally_often_and_lost_repeats_are_split_over_other_starts():
-    values = np.zeros((3, 9))
-    values[0, 4] = np.nan
-    first, second = split(table_of(values, labelled(3, 3)), 40)
-    assert not (first & second).any()
-    assert not first[0, :, 4].any()
-    assert not second[0, :, 4].any()
-    for one in (first, second):
-        assert (one.reshape(3, 40, 3, 3).sum(axis=-1) == 1).all()
-    assert (first[1] == first[2]).all()
-    assert len(np.unique(first[1], axis=0)) > 5
-    values = np.zeros((2, 4))
-    values[0, 3] = np.nan
-    first, second = split(table_of(values, labelled(2, 2)), 10)
-    assert (first[0] ^ second[0] == [True, True, False, False]).all()
-    assert (first[1] ^ second[1]).all()
+def test_repeats_of_a_start_are_averaged_and_a_start_that_was_not_driven_stays_unknown():
     found = by_start(table_of([[1.0, 3.0, np.nan, 5.0], [1.0, 1.0, np.nan, np.nan]], labelled(2, 2)))
     assert found.episodes == ("0", "1")
     np.testing.assert_array_equal(found.values[:, :, 0], [[2.0, 5.0], [1.0, np.nan]])
-
-
-@pytest.mark.parametrize(
-    ("labels", "expected"),
-    [("0/0 0/1 1/0 1/1", True), ("0 1 2 3", False), ("0/0 0/1 1/0 2/0", False), ("0/0 0/1 1 1/0", True)],
-)
-def test_repeats_are_there_only_where_every_start_has_two(labels, expected):
-    assert is_repeated(table_of(np.zeros((2, 4)), labels.split())) is expected
-
-
-OWN = [[0.0, 0.0, np.nan, np.nan], [np.nan, np.nan, 0.0, 0.0]]
-ONCE = [[0.0, np.nan, 0.0, np.nan], [0.0] * 4]
-
-
-@pytest.mark.parametrize(("values", "labels"), [(OWN, "A0/0 A0/1 A1/0 A1/1"), (ONCE, "0/0 0/1 1/0 1/1")])
-def test_labels_of_an_agent_s_own_are_no_starts_and_an_agent_without_a_start_twice_leaves_none_to_split(values, labels):
-    assert not is_repeated(table_of(values, labels.split()))
 
 
 def test_repeats_of_a_start_are_drawn_together_and_paired_by_start_with_a_proxy_of_plain_ones():

@@ -312,7 +312,7 @@ def draw_means(
             drawn, basis = _rates(means, independent, draws, rng), "successes, uniform prior"
         elif target.counts.min() > 1:
             drawn, counts = _means(target, column, rectified, draws, rng)
-            basis = "episodes' spread, pooled over agents"
+            basis = "episodes' spread, drawn to what agents have in common"
         elif target.errors is not None and (target.errors[:, column] > 0.0).any():
             errors = np.nan_to_num(target.errors[:, column])
             drawn, basis = means + errors * rng.standard_normal((draws, len(means))), "published standard errors"
@@ -351,6 +351,13 @@ def _rates(means: Floats, counts: Floats, draws: int, rng: np.random.Generator) 
     return rng.beta(counts * means + PRIOR, counts * (1.0 - means) + PRIOR, (draws, len(means)))
 
 
+TINY = 1e-3
+"""A variance below this share of the pooled one is taken for as much: a few alike scores are no certainty."""
+FEWEST_MODERATED = 3
+"""So many agents tell how much their spreads differ."""
+NEWTON_STEPS = 50
+
+
 def _means(
     table: ScoreTable, column: int, rectified: Rectified | None, draws: int, rng: np.random.Generator
 ) -> tuple[Floats, Floats]:
@@ -358,29 +365,61 @@ def _means(
 
     Where all agents share their starts, what these do to all alike is left out.
     """
-    starts = by_start(table)
-    freedom = float(starts.counts.sum() - len(table.agents))
+    starts, agents = by_start(table), len(table.agents)
     shared = starts.complete and len(starts.episodes) > 1
-    if shared:
-        freedom = float((len(table.agents) - 1) * (len(starts.episodes) - 1))
-    elif freedom < 1.0:  # one start alone, driven many times
-        starts, freedom = table, float(table.counts.sum() - len(table.agents))
+    if not shared and starts.counts.sum() == agents:  # one start alone, driven many times
+        starts = table
+    degrees: Floats = np.asarray(starts.counts - 1.0, dtype=np.float64) * (1.0 - shared / agents)
 
-    def variance(values: Floats) -> float:
+    def moderated(values: Floats) -> tuple[Floats, float]:
         residuals = values - np.nanmean(values, axis=1, keepdims=True)
         residuals -= residuals.mean(axis=0) if shared else 0.0
-        return float(np.nansum(residuals**2)) / freedom
+        squares = np.nansum(residuals**2, axis=1)
+        own = squares / np.maximum(degrees, TINY)
+        if shared and agents > 2:  # an agent's residuals have a share of all agents' noise
+            own = (own * (agents - 1.0) - squares.sum() / degrees.sum()) / (agents - 2.0)
+        return moderate(own, degrees, float(squares.sum() / degrees.sum()))
 
-    means, own = table.means[:, column], variance(starts.values[..., column])
-    variances = np.full(len(means), own)
+    means, (own, common) = table.means[:, column], moderated(starts.values[..., column])
+    variances = own
     if rectified is not None:
         means = rectified.means
-        variances += rectified.shares * (variance(rectified.rest) - own)
+        variances = own + rectified.shares * (moderated(rectified.rest)[0] - own)
         # What is chosen for being alike is too much alike.
         variances = np.maximum(variances, own * table.counts / rectified.worth)
-    scale = np.sqrt(variances / starts.counts * freedom / rng.chisquare(freedom, (draws, 1)))
-    worth = table.counts * own / variances if own > 0.0 else table.counts.astype(np.float64)
-    return means + scale * rng.standard_normal((draws, len(means))), worth
+    # Each agent's spread is uncertain by itself, but for one that all have.
+    all_alike = common == np.inf
+    freedom = degrees.sum() if all_alike else np.minimum(common + degrees, degrees.sum())
+    chances = rng.chisquare(freedom, (draws, 1 if all_alike else agents))
+    scale = np.sqrt(variances / starts.counts * freedom / chances)
+    worth = np.multiply(
+        table.counts, np.divide(own, variances, out=np.ones(agents), where=variances > 0.0), dtype=float
+    )
+    return means + scale * rng.standard_normal((draws, agents)), worth
+
+
+def moderate(own: Floats, degrees: Floats, pooled: float) -> tuple[Floats, float]:
+    """Draw agents' variances (agents,) to what they have in common, and tell how many degrees of freedom that counts.
+
+    Variances that differ by no more than chance are the pooled one, and it counts infinitely many.
+    Source: Smyth, Linear models and empirical Bayes methods for assessing differential expression in microarray
+    experiments, 2004.
+    """
+    from scipy.special import digamma, polygamma
+
+    alike = np.full(len(own), pooled), np.inf
+    if len(own) < FEWEST_MODERATED or not pooled > 0.0 or degrees.min() <= 0.0:
+        return alike
+    own = np.maximum(own, TINY * pooled)
+    logs = np.log(own) - digamma(degrees / 2.0) + np.log(degrees / 2.0)
+    apart = float(logs.var(ddof=1) - polygamma(1, degrees / 2.0).mean())
+    if apart <= 0.0:
+        return alike
+    half = 0.5 + 1.0 / apart
+    for _ in range(NEWTON_STEPS):  # trigamma(half) = apart
+        half += polygamma(1, half) * (1.0 - polygamma(1, half) / apart) / polygamma(2, half)
+    common = np.exp(logs.mean() + digamma(half) - np.log(half))
+    return (2.0 * half * common + degrees * own) / (2.0 * half + degrees), 2.0 * half
 
 
 def _own_intervals(table: ScoreTable, columns: Sequence[int], middle: Floats, saving: Saving | None) -> list[Ends]:

@@ -43,7 +43,9 @@ def _say_prpv(assessment: Assessment, proxy: str, target: str) -> str:
     floor = assessment.noise_floor
     chance = f"{short(random.mean)} ± {short(random.deviation)}, p = {random.p_value:.2g}"
     level = "" if floor.value is None else with_span(floor.value, floor.low, floor.high)
-    if random.explains:
+    if random.too_few:
+        worth = f"as low as any order of these agents has, which chance may be too ({chance})"
+    elif random.explains:
         worth = f"no better than chance ({chance})"
     elif assessment.at_noise_floor:
         worth = f"no difference from the target can be seen (noise floor {level})"

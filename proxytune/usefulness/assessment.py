@@ -170,7 +170,11 @@ class Assessment:
             sides = (self.inputs.proxy, self.inputs.target)
             fewest = min((repeats(side) > 0).sum(axis=1).min() for side in sides)  # Repeats of a start count once
             lines += [ONE_START] if fewest == 1 else [LEFT_OUT] + [PAIRED] * self.inputs.paired
-        if random.explains:
+        if random.too_few:
+            lines.append(
+                f"these agents cannot exclude chance: a random ranking scores as low with p = {random.p_value:.2g}"
+            )
+        elif random.explains:
             lines.append(f"PRPV is no better than chance: a random ranking scores as low with p = {random.p_value:.2g}")
         if self.at_noise_floor:
             lines.append(PERFECT)

@@ -184,11 +184,17 @@ class Chance:
     p_value: float  # how probable a PRPV as low as the proxy's is by chance, the proxy's own order counted as one
     permutations: int  # how many were drawn, or all
     exact: bool = False  # whether all orders were looked at
+    lowest: bool = False  # whether none of these scores lower than the proxy's own
 
     @property
     def explains(self) -> bool:
         """True if a random ranking does as well too often to be ruled out."""
         return self.p_value >= LEVEL
+
+    @property
+    def too_few(self) -> bool:
+        """True if no order of these agents could rule it out: the proxy's own is as good as any."""
+        return self.explains and self.lowest and self.deviation > 0.0
 
 
 def chance(inputs: Comparison, *, permutations: int = 1000, seed: int = 0) -> Chance:
@@ -202,7 +208,9 @@ def chance(inputs: Comparison, *, permutations: int = 1000, seed: int = 0) -> Ch
         orders = np.stack([rng.permutation(len(in_proxy)) for _ in range(permutations)])
     shuffled = in_proxy[orders]
     values = resampling.in_blocks(lambda proxy, _: prpv_of_means(proxy, on_target, inputs.metrics), shuffled, shuffled)
-    as_low = (values <= prpv_of_means(in_proxy, on_target, inputs.metrics)).sum()
+    own = prpv_of_means(in_proxy, on_target, inputs.metrics)
+    as_low = (values <= own).sum()
     # The proxy's own order is one of all, and is counted with those that are drawn.
     p_value = float(as_low / len(orders) if exact else (1 + as_low) / (1 + len(orders)))
-    return Chance(float(values.mean()), float(values.std(ddof=not exact)), p_value, len(orders), exact)
+    lowest = exact and bool(own <= values.min())
+    return Chance(float(values.mean()), float(values.std(ddof=not exact)), p_value, len(orders), exact, lowest)

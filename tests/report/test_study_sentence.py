@@ -69,6 +69,13 @@ ABOVE = {"prpv": Estimate(16.0, 13.0, 19.0), "excess": Estimate(11.0, 4.2, 17.8)
 BY_CHANCE = {**ABOVE, "prpv": Estimate(58.0, 50.2, 66.0), "chance": EXPLAINING}
 
 
+def test_where_the_agents_are_too_few_to_exclude_chance_theta_is_told_all_the_same():
+    text = said(chance=Chance(3.0, 1.7, 1 / 6, 6, exact=True, lowest=True))
+    assert "No θ found" not in text
+    assert ", as low as any order of these agents has, which chance may be too (p = 0.17)." in text
+    assert text.endswith("Next: add agents, for any order of these may be chance.")
+
+
 def test_theta_that_makes_a_perfect_proxy_is_found_and_the_least_known_parameter_comes_next():
     assert said() == (
         "θ found: trim 0.121 (0.108 to 0.146), camera pitch 13.0 deg (11.1 to 14.4), blur 0.026 s (0.005 to 0.062). "

@@ -95,7 +95,7 @@ def test_nothing_is_said_of_halves_above_what_they_score_nor_of_a_perfect_proxy_
     assert found.prpv.value == 0 <= floor.high
     assert found.chance.p_value >= 0.05
     assert found.at_noise_floor is False
-    assert any(note.startswith("PRPV is no better than chance") for note in found.notes)
+    assert any(note.startswith("these agents cannot exclude chance") for note in found.notes)
     assert not any(PERFECT in note for note in found.notes)
     sure = assess(proxy=ordered(2, agents=8), target=ordered(2, agents=8), metrics=CLEAR)
     assert not any("chance" in note for note in sure.notes)

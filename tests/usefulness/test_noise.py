@@ -195,3 +195,20 @@ def test_what_is_always_alike_or_no_zero_or_one_is_no_rate(successes):
     both = {"proxy": table_of_rates(successes), "target": table_of_rates(successes)}
     assert success_rates(compare(**both, metrics=METRICS)) == ()
     assert np.unique(both["proxy"].values[..., 1]).size > 2
+
+
+def test_three_agents_cannot_exclude_chance_however_well_a_proxy_ranks_them_and_that_is_said():
+    agents = {(name, str(k)): {"success": 10.0 * row + k} for row, name in enumerate("abc") for k in range(3)}
+    table = ScoreTable.from_episodes(agents)
+    metrics = [Metric("success")]
+    right = assess(proxy=table, target=table, metrics=metrics)
+    assert (right.prpv.value, right.chance.explains, right.chance.too_few) == (0, True, True)
+    assert any("these agents cannot exclude chance" in line for line in right.notes)
+    turned = ScoreTable.from_episodes(
+        {(name, label): {"success": -one["success"]} for (name, label), one in agents.items()}
+    )
+    wrong = assess(proxy=turned, target=table, metrics=metrics)
+    assert (wrong.chance.explains, wrong.chance.too_few) == (True, False)
+    more = {(name, str(k)): {"success": 10.0 * row + k} for row, name in enumerate("abcd") for k in range(3)}
+    four = assess(proxy=ScoreTable.from_episodes(more), target=ScoreTable.from_episodes(more), metrics=metrics)
+    assert (four.chance.explains, four.chance.too_few) == (False, False)

@@ -38,7 +38,8 @@ def _say_theta(result: StudyResult) -> str:
     parameters, misfit = known_parameters(result), result.knowledge.misfit
     done, budget = len(result.trials), result.study.settings.budget
     so_far = f"{done} of {budget} trials so far. " if _trials_left(result) else ""
-    if result.judged.chance.explains:
+    chance = result.judged.chance
+    if chance.explains and not chance.too_few:
         return f"{so_far}No θ found."
     if misfit.fits is False:
         told = "" if misfit.p_value is None else f" ({probability(misfit.p_value)})"
@@ -83,6 +84,9 @@ def _say_usefulness(result: StudyResult) -> str:
     score = f"PRPV (proxy relative predictivity value) is {told}"
     if chance.explains:
         at_random = f"{short(chance.mean)} ± {short(chance.deviation)}"
+        if chance.too_few:
+            may = f"which chance may be too ({probability(chance.p_value)})"
+            return f"{score}, as low as any order of these agents has, {may}."
         return f"{score}, no better than chance ({at_random}, {probability(chance.p_value)})."
     if not _is_fresh(result):
         return f"{score}, which may be partly luck."
@@ -126,6 +130,8 @@ def say_next_step(result: StudyResult) -> str:
         effects = declared_of(settings.space.names)
         declared = f" --declared {','.join(effects)}" if effects else ""
         return f"log drives of the target (a model's: `record`) and run `python -m proxytune diagnose LOG{declared}`"
+    if chance.too_few:
+        return "add agents, for any order of these may be chance"
     if chance.explains:
         return f"{_more_trials(result)}, or add agents whose scores differ more"
     if not _is_fresh(result) and result.rescored:

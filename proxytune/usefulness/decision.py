@@ -39,9 +39,6 @@ agents. Intervals of two to twenty equal agents then hold about 96 %; with a lim
 87 %, of eight 67 %."""
 PRIOR = 1.0
 """Successes and failures before the first episode: every rate is as probable as any other."""
-NO_NOISE = (
-    "the target gives means without the number of rollouts: no probability can be told; give it (score --rollouts)"
-)
 
 
 @dataclass(frozen=True)
@@ -112,6 +109,7 @@ class Decision:
     scores: Mapping[str, tuple[float, Ends]] | None
     draws: Floats | None  # draws of the true means, shape (draws, agents), more being better; None likewise
     counts: tuple[float, ...]  # rollouts on the target that each agent's mean is worth; none where that is not known
+    reason: str = ""  # why no probability can be told; "" where one is
 
     def to_frame(self) -> "pd.DataFrame":
         """One row per agent: score, probability to be the best and expected regret, with intervals."""
@@ -134,7 +132,7 @@ class Decision:
     @property
     def notes(self) -> tuple[str, ...]:
         """Lines on what the decision rests on, or why it says little."""
-        lines = [f"chosen by {self.basis}" if self.draws is not None else NO_NOISE]
+        lines = [self.reason or f"chosen by {self.basis}"]
         if len(self.observed.proxy_winners) > 1:
             lines.append(f"{' and '.join(self.observed.proxy_winners)} tie in the proxy; regret is that of the worse")
         return tuple(lines)
@@ -173,9 +171,13 @@ def decide(inputs: Comparison, asked: Asked, saving: Saving | None = None, seed:
         without=without, least_told=None, basis="", scores=None, draws=None, counts=(),
     )  # fmt: skip
     if known is None:
-        return bare
-    every, counts, centre, basis = known
-    draws = _mean_of(every, inputs.target, columns)
+        return replace(bare, reason=_unknown(inputs.target, columns))
+    every, counts, means, basis = known
+    sign, stretch = signs[0], _stretch(inputs.target, columns)
+    draws = np.mean(every, axis=0)
+    middle = draws.mean(axis=0)
+    # Stretched, but not beyond what the metrics' own draws reach, as rates of 0 and 1
+    draws = np.clip(middle + stretch * (draws - middle), np.min(every), np.max(every))
     regret = draws.max(axis=1, keepdims=True) - draws
     on_top = regret <= ROUNDING * max(1.0, float(np.abs(draws).max()))
     # Agents that tie, as those that never differ, share the probability.
@@ -184,19 +186,14 @@ def decide(inputs: Comparison, asked: Asked, saving: Saving | None = None, seed:
     order = np.argsort(-best, kind="stable")
     held = order[: int(np.searchsorted(np.cumsum(best[order]), CONFIDENCE - ROUNDING)) + 1]
     spread = draws.std(axis=0)
-    sign = signs[0]
-    middle, ends = sign * centre, [interval(sign * draws[:, row]) for row in range(len(agents))]
-    most = np.zeros(len(agents))
-    if inputs.target.counts.min() > 1 and not any(is_rate(inputs.target, column) for column in columns):
-        ends = _own_intervals(inputs.target, columns, middle, saving)
-    if len(columns) == 1 and is_rate(inputs.target, columns[0]):
-        ends = rate_intervals(middle, counts * independence(inputs.target, columns[0]))
+    middle, low, high = _spans(inputs.target, columns, means, counts, saving)
+    centre, most = sign * middle, np.zeros(len(agents))
+    if all(_has_prior(inputs.target, column) for column in columns):
         # Of agents that, or whose best rival, always or never succeeded: there the prior pulls draws away from rates
-        # at the end of what can be. The ends of their regrets follow from those of both rates (Zou and Donner, 2008,
-        # "Construction of confidence limits about effect measures").
-        low_high = np.sort(sign * np.array(ends), axis=1)
+        # at the end of what can be. The ends of their regrets follow from those of both scores.
+        worse, better = (middle - low, high - middle)[:: int(sign)]
         best_rival, settled = int(centre.argmax()), (middle <= 0.0) | (middle >= 1.0)
-        reach = np.hypot(low_high[best_rival, 1] - centre[best_rival], centre - low_high[:, 0])
+        reach = np.hypot(better[best_rival], worse)
         most = np.where(settled | settled[best_rival], centre[best_rival] - centre + reach, 0.0)
     highest = np.array([most, expected])
     return replace(
@@ -206,16 +203,16 @@ def decide(inputs: Comparison, asked: Asked, saving: Saving | None = None, seed:
         expected_regret=dict(zip(agents, map(float, expected), strict=True)),
         regret_interval={
             # No regret at all belongs to it unless the agent is very unlikely to be the best; the expected one always.
-            agent: (0.0 if best[row] > BARELY_BEST / len(agents) ** 3 else low, float(max(high, *highest[:, row])))
-            for row, (agent, (low, high)) in enumerate(zip(agents, map(interval, regret.T), strict=True))
+            agent: (0.0 if best[row] > BARELY_BEST / len(agents) ** 3 else least, float(max(top, *highest[:, row])))
+            for row, (agent, (least, top)) in enumerate(zip(agents, map(interval, regret.T), strict=True))
         },
         best_probabilities=dict(zip(agents, map(float, best), strict=True)),
         not_told_apart=tuple(agents[row] for row in held if row != place),
         least_told=float(NORMAL_95 * np.sqrt(2.0) * np.median(spread)),
         basis=basis,
-        scores={agent: (float(middle[row]), ends[row]) for row, agent in enumerate(agents)},
+        scores={agent: (float(middle[row]), (float(low[row]), float(high[row]))) for row, agent in enumerate(agents)},
         draws=draws,
-        counts=tuple(map(float, counts)),
+        counts=tuple(map(float, np.mean(counts, axis=0))),
     )
 
 
@@ -294,14 +291,13 @@ def draw_means(
     rollouts: int | None,
     saving: Saving | None,
     rng: np.random.Generator,
-) -> tuple[list[Floats], Floats, Floats, str] | None:
-    """Draws of each agent's true mean by each metric, shape (draws, agents); rollouts, means over all, and their basis.
+) -> tuple[list[Floats], list[Floats], list[Floats], str] | None:
+    """Draws of each agent's true mean by each metric, shape (draws, agents); rollouts, means of each, and their basis.
 
     None where nothing is known of the noise of some metric.
     """
     draws = max(FEWEST_DRAWS, min(DRAWS, MOST_DRAWN // len(target.agents)))
-    found, bases = list[Floats](), []
-    worth, centre = np.zeros((2, len(target.agents)))
+    found, worth, centres, bases = list[Floats](), list[Floats](), list[Floats](), []
     for column, sign in zip(columns, signs, strict=True):
         means, counts = target.means[:, column], target.counts.astype(np.float64)
         rectified = saving.rectified.get(target.metrics[column]) if saving is not None else None
@@ -313,9 +309,9 @@ def draw_means(
         elif target.counts.min() > 1:
             drawn, counts = _means(target, column, rectified, draws, rng)
             basis = "episodes' spread, drawn to what agents have in common"
-        elif target.errors is not None and (target.errors[:, column] > 0.0).any():
-            errors = np.nan_to_num(target.errors[:, column])
-            drawn, basis = means + errors * rng.standard_normal((draws, len(means))), "published standard errors"
+        elif target.errors is not None and _has_errors(target, column):
+            noise = target.errors[:, column] * rng.standard_normal((draws, len(means)))
+            drawn, basis = means + noise, "published standard errors"
         elif rollouts is not None and (means >= 0.0).all() and (means <= 1.0).all():
             counts = np.full(len(means), float(rollouts))
             drawn = _rates(means, counts, draws, rng)
@@ -325,25 +321,66 @@ def draw_means(
         if rectified is not None:
             basis += ", rectified by the proxy's paired starts"
         found.append(sign * drawn)
-        worth += counts
-        centre += sign * means
+        worth.append(counts)
+        centres.append(means)
         bases.append(basis)
-    return found, worth / len(columns), centre / len(columns), " and ".join(dict.fromkeys(bases))
+    return found, worth, centres, " and ".join(dict.fromkeys(bases))
 
 
-def _mean_of(every: Sequence[Floats], target: ScoreTable, columns: Sequence[int]) -> Floats:
-    """Draws of the mean of metrics, about their middle as much wider as the metrics of an episode go together."""
-    draws = np.asarray(np.mean(every, axis=0))
+def _has_errors(target: ScoreTable, column: int) -> bool:
+    """True if each agent's mean was published with a standard error."""
+    return target.errors is not None and bool((target.errors[:, column] > 0.0).all())
+
+
+def _has_prior(target: ScoreTable, column: int) -> bool:
+    """True if draws of a metric have the uniform prior of rates, of its rollouts or of those stated."""
+    return is_rate(target, column) or (target.counts.min() < 2 and not _has_errors(target, column))
+
+
+def _unknown(target: ScoreTable, columns: Sequence[int]) -> str:
+    """Say why nothing is known of the noise of the target's means."""
+    errors = np.zeros((len(target.agents), 1)) if target.errors is None else target.errors[:, columns]
+    bare = [agent for agent, own in zip(target.agents, errors, strict=True) if not (own > 0.0).all()]
+    what = "means without the number of rollouts"
+    if len(bare) < len(target.agents):
+        names = ", ".join(bare[:3]) + (f" and {len(bare) - 3} others" if len(bare) > 3 else "")
+        what = f"no standard error above 0, nor the number of rollouts, of {names}"
+    return f"the target gives {what}: no probability can be told; give it (score --rollouts)"
+
+
+def _stretch(target: ScoreTable, columns: Sequence[int]) -> float:
+    """How much wider a mean of metrics spreads than if those of an episode were independent, pooled within agents."""
     # Cells as 18/25 have no episodes: their outcomes are sorted, and go together for that alone.
     if len(columns) == 1 or target.counts.min() < 2 or any(is_sorted(target, column) for column in columns):
-        return draws
+        return 1.0
     values = target.values[..., columns]
     residuals = values - np.nanmean(values, axis=1, keepdims=True)
     apart, whole = np.nansum(residuals**2) / len(columns) ** 2, np.nansum(residuals.mean(axis=-1) ** 2)
-    if whole > apart:
-        middle = draws.mean(axis=0)
-        draws = middle + math.sqrt(whole / apart) * (draws - middle)
-    return draws.clip(np.min(every), np.max(every))
+    return math.sqrt(whole / apart) if whole > apart else 1.0
+
+
+def _spans(
+    target: ScoreTable, columns: Sequence[int], means: Sequence[Floats], counts: Sequence[Floats], saving: Saving | None
+) -> tuple[Floats, Floats, Floats]:
+    """Each agent's mean over metrics and the ends of its 95 % interval.
+
+    These follow from the ends by each metric (Zou and Donner, 2008, "Construction of confidence limits about effect
+    measures").
+    """
+    squares = np.zeros((2, len(target.agents)))
+    for column, own, count in zip(columns, means, counts, strict=True):
+        if _has_prior(target, column):
+            ends = np.transpose(rate_intervals(own, count * independence(target, column)))
+        elif target.counts.min() > 1:
+            ends = own + _own_reach(target, column, saving) * [[-1.0], [1.0]]
+        else:
+            ends = own + NORMAL_95 * np.asarray(target.errors)[:, column] * [[-1.0], [1.0]]
+        squares += (ends - own) ** 2
+    below, above = _stretch(target, columns) * np.sqrt(squares) / len(columns)
+    middle = np.mean(means, axis=0)
+    if all(_has_prior(target, column) for column in columns):
+        return middle, (middle - below).clip(0.0), (middle + above).clip(max=1.0)
+    return middle, middle - below, middle + above
 
 
 def _rates(means: Floats, counts: Floats, draws: int, rng: np.random.Generator) -> Floats:
@@ -422,20 +459,18 @@ def moderate(own: Floats, degrees: Floats, pooled: float) -> tuple[Floats, float
     return (2.0 * half * common + degrees * own) / (2.0 * half + degrees), 2.0 * half
 
 
-def _own_intervals(table: ScoreTable, columns: Sequence[int], middle: Floats, saving: Saving | None) -> list[Ends]:
+def _own_reach(table: ScoreTable, column: int, saving: Saving | None) -> Floats:
     """Student's t of each agent's own scores about its mean: what a start does to all agents alike belongs to it."""
     from scipy.special import stdtrit
 
     starts = by_start(table)
     starts = starts if starts.counts.min() > 1 else table
-    rectified = [saving.rectified.get(table.metrics[column]) if saving else None for column in columns]
-    scores = [starts.values[..., column] for column in columns]
-    rest = [own if one is None else one.rest for own, one in zip(scores, rectified, strict=True)]
-    own, less = (np.nanvar(np.mean(values, axis=0), axis=1, ddof=1) for values in (scores, rest))
-    share = np.max([one.shares for one in rectified if one], axis=0, initial=0.0)
-    reach = stdtrit(starts.counts - 1.0, 0.5 + CONFIDENCE / 2.0)
-    reach *= np.sqrt(((1.0 - share) * own + share * less) / starts.counts)
-    return list(zip(map(float, middle - reach), map(float, middle + reach), strict=True))
+    variances = np.nanvar(starts.values[..., column], axis=1, ddof=1)
+    rectified = saving.rectified.get(table.metrics[column]) if saving is not None else None
+    if rectified is not None:
+        variances += rectified.shares * (np.nanvar(rectified.rest, axis=1, ddof=1) - variances)
+    quantile = stdtrit(starts.counts - 1.0, 0.5 + CONFIDENCE / 2.0)
+    return np.asarray(quantile * np.sqrt(variances / starts.counts), dtype=np.float64)
 
 
 @dataclass(frozen=True)

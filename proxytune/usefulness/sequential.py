@@ -163,7 +163,7 @@ def sequential_test(inputs: Comparison, column: int = 0, *, seed: int = 0) -> Se
 
 
 def _scores(table: ScoreTable, column: int, direction: str) -> list[Floats]:
-    """Each agent's scores, start by start in the order of the table, more being better; its repeats of one alone."""
+    """Each agent's scores, start by start in the table's order, more being better; of one start alone its repeats."""
     starts = by_start(table)
     table = starts if len(starts.episodes) > 1 else table
     rows = [row[driven] for row, driven in zip(table.values[..., column], table.driven, strict=True)]

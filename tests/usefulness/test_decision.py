@@ -187,6 +187,30 @@ def test_the_regret_of_an_agent_that_never_succeeded_may_be_all_that_there_is(di
     assert found.regret_interval["agent 2"][1] < 0.9
 
 
+def test_an_interval_holds_its_own_rate_of_rollouts_stated_or_of_several_tasks_at_the_end_of_what_can_be():
+    stated = means(["success"], a=(1.0,), b=(0.0,))
+    found, made = decided(stated, stated, rollouts=20), decided(counted([20, 0], 20), counted([20, 0], 20))
+    for agent, old in (("a", "agent 0"), ("b", "agent 1")):
+        assert found.scores[agent][1] == pytest.approx(made.scores[old][1])
+        assert found.regret_interval[agent] == pytest.approx(made.regret_interval[old], abs=0.01)
+    tasks = [Metric("x"), Metric("y")]
+    rolled = table_of(np.repeat([[1.0], [0.0]], 20, axis=1)[..., None] * [1.0, 1.0], metrics=("x", "y"))
+    found = decided(rolled, rolled, tasks)
+    assert found.scores["A0"][1] == (pytest.approx(0.902, abs=0.001), 1.0)
+    assert found.scores["A1"][1] == (0.0, pytest.approx(0.098, abs=0.001))
+    assert found.regret_interval["A1"][1] >= 1.0
+
+
+def test_a_mean_without_its_error_has_no_interval_and_nobody_a_probability():
+    values, errors = np.array([[[0.6]], [[0.62]], [[0.5]]]), np.array([[0.1], [0.0], [0.1]])
+    target = ScoreTable(tuple("abc"), ("1",), ("success",), values, errors)
+    found = decided(target, target)
+    assert (found.winner, found.probability_best, found.scores) == ("b", None, None)
+    assert found.notes == (found.reason,)
+    assert "no standard error above 0, nor the number of rollouts, of b: no probability" in found.reason
+    assert decided(target, target, rollouts=30).scores["b"][1][0] < 0.5
+
+
 @pytest.mark.parametrize(
     ("asked", "complaint"),
     [({"rollouts": 0}, "rollouts must be"), ({"bound": 0.0}, "above 0"), ({"decide_on": "succes"}, "did you mean")],

@@ -132,7 +132,8 @@ class _Pairs:
     means: Floats
     counts: Floats
     correlation: float
-    correlation_interval: Ends
+    beyond_noise: bool  # whether proxies' further rollouts help by more than chance makes of no correlation
+    likely: Ends  # 95 % of the square of the correlation
     square: float  # of the correlation, without what chance adds to that of few pairs
     sure_square: float  # of one lower by its standard error: what is chosen for being high is too high
     rest: Floats  # the target's scores less λ times the proxy's, (agents, starts)
@@ -151,21 +152,15 @@ class _Pairs:
         return self.counts / (1.0 - self.sure_square * self.shares)
 
     @property
-    def beyond_noise(self) -> bool:
-        return self.share > 0.0 and (self.correlation_interval[0] > 0.0 or self.correlation_interval[1] < 0.0)
-
-    @property
     def worth_interval(self) -> Ends:
-        low, high = self.correlation_interval
-        weak, strong = 0.0 if low <= 0.0 <= high else min(low**2, high**2), max(low**2, high**2)
         mean = float(self.counts.mean())
-        ends = (mean / (1.0 - min(square * self.share, 0.99)) - mean for square in (weak, strong))
+        ends = (mean / (1.0 - min(square * self.share, 0.99)) - mean for square in self.likely)
         return next(ends), next(ends)
 
 
 def _pairs(every: Sequence[Comparison], column: int) -> _Pairs | None:
     """Means of a metric, rectified by one or several proxies; None where starts are not paired."""
-    from scipy.special import chdtri
+    from scipy.special import chdtri, fdtri
 
     target, agents = every[0].target, every[0].agents
     if is_sorted(target, column) and any(is_sorted(one.proxy, column) for one in every):
@@ -177,7 +172,8 @@ def _pairs(every: Sequence[Comparison], column: int) -> _Pairs | None:
     shared = [label for label in other.episodes if label in known]
     if len(shared) < FEWEST_PAIRS:
         return None
-    alone = [label for label in proxies[0].episodes if label in known - set(shared)]
+    unpaired = known - set(shared)
+    alone = [label for label in proxies[0].episodes if label in unpaired]
     x = np.stack([one.arrange(agents=agents, episodes=shared + alone).values[..., column] for one in proxies])
     y = other.arrange(agents=agents, episodes=shared).values[..., column]
     met: Flags = np.asarray(~np.isnan(x).any(axis=0))
@@ -196,7 +192,16 @@ def _pairs(every: Sequence[Comparison], column: int) -> _Pairs | None:
     size = min(math.sqrt(max(float(slopes @ xy), 0.0) / yy), 0.999999)
     rho = math.copysign(size, slopes[0]) if used == 1 else size
     error = 1.0 / math.sqrt(max(freedom - used - 1.0, 1.0))
-    middle, half = math.atanh(rho), error * math.sqrt(chdtri(used, 1.0 - CONFIDENCE))
+    middle, shares = math.atanh(size), more / (n + more)
+    least = error * math.sqrt(chdtri(used, 1.0 - CONFIDENCE))
+    # Without each start in turn (a jackknife): tails may be heavy, and a start may move all agents alike.
+    less = np.sqrt(both * (n / (n - 1.0))[:, None])
+    dx, dy = dx * less, dy * less
+    grams, crosses = gram - np.einsum("ian,jan->nij", dx, dx), xy - np.einsum("ian,an->ni", dx, dy)
+    explained = np.einsum("ni,nij,nj->n", crosses, np.linalg.pinv(grams, rcond=1e-9, hermitian=True), crosses)
+    sizes = np.sqrt(np.clip(explained / np.maximum(yy - (dy * dy).sum(axis=0), 1e-12 * yy), 0.0, 0.999998))
+    spread = math.sqrt((len(shared) - 1.0) * float(np.arctanh(sizes).var()))
+    half = spread * math.sqrt(used * fdtri(used, len(shared) - 1.0, CONFIDENCE))
     counted = np.concatenate([both, met[:, len(shared) :]], axis=1)
     everything = np.nanmean(np.where(counted, x, np.nan), axis=-1)
     rest = np.full((len(agents), len(other.episodes)), np.nan)
@@ -206,11 +211,12 @@ def _pairs(every: Sequence[Comparison], column: int) -> _Pairs | None:
         means=means,
         counts=target.counts.astype(np.float64),
         correlation=rho,
-        correlation_interval=(math.tanh(middle - half), math.tanh(middle + half)),
+        beyond_noise=bool(shares.mean() > 0.0 and middle > least),
+        likely=(math.tanh(max(0.0, middle - half)) ** 2, math.tanh(middle + half) ** 2),
         square=max(0.0, 1.0 - (1.0 - rho**2) * freedom / max(freedom - used, 1.0)),
-        sure_square=math.tanh(max(0.0, abs(middle) - error)) ** 2,
+        sure_square=math.tanh(max(0.0, middle - error)) ** 2,
         rest=rest,
-        shares=more / (n + more),
+        shares=shares,
     )
 
 

@@ -119,6 +119,18 @@ def test_which_of_two_proxies_saves_more_is_told_and_without_pairs_a_model_over_
     assert "fewer than 4" in saving_of(compare(proxy=few[0], target=few[1], metrics=SUCCESS)).reason
 
 
+def test_what_pairs_are_worth_is_held_as_often_as_is_said_also_where_tails_are_heavy():
+    rng, held, agents, labels = np.random.default_rng(9), [], tuple("abcdefgh"), tuple(map(str, range(220)))
+    for _ in range(100):
+        x = rng.standard_t(3, (8, 220))
+        y = 0.95 * x[:, :20] + np.sqrt(1.0 - 0.95**2) * rng.standard_t(3, (8, 20))
+        proxy = ScoreTable(agents, labels, ("success",), x[..., None])
+        target = ScoreTable(agents, labels[:20], ("success",), y[..., None])
+        low, high = saving_of(compare(proxy=proxy, target=target, metrics=SUCCESS)).interval
+        held.append(low <= 20.0 / (1.0 - 0.95**2 * 200 / 220) - 20.0 <= high)
+    assert np.mean(held) >= 0.87  # 0.55 where scores are supposed to be normal
+
+
 def test_a_model_over_agents_promises_nothing_of_what_starts_do_to_all_agents_alike():
     rng, held, worth = np.random.default_rng(7), [], []
     agents, labels = tuple("abcdefgh"), tuple(map(str, range(25)))

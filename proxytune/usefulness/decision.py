@@ -173,11 +173,11 @@ def decide(inputs: Comparison, asked: Asked, saving: Saving | None = None, seed:
     if known is None:
         return replace(bare, reason=_unknown(inputs.target, columns))
     every, counts, means, basis = known
-    sign, stretch = signs[0], _stretch(inputs.target, columns)
-    draws = np.mean(every, axis=0)
-    middle = draws.mean(axis=0)
-    # Stretched, but not beyond what the metrics' own draws reach, as rates of 0 and 1
-    draws = np.clip(middle + stretch * (draws - middle), np.min(every), np.max(every))
+    draws, sign = np.mean(every, axis=0), signs[0]
+    if (stretch := _stretch(inputs.target, columns)) > 1.0:
+        middle = draws.mean(axis=0)
+        # Not beyond what the metrics' own draws reach, as rates of 0 and 1
+        draws = np.clip(middle + stretch * (draws - middle), np.min(every), np.max(every))
     regret = draws.max(axis=1, keepdims=True) - draws
     on_top = regret <= ROUNDING * max(1.0, float(np.abs(draws).max()))
     # Agents that tie, as those that never differ, share the probability.

@@ -81,6 +81,7 @@ def score_text(assessments: Assessments, selection: Selection | None, left_out: 
         ((_, assessment),) = assessments.items()
         notes += [f"decision: {line}" for line in decision.decision_table(assessment, target).notes]
     else:
+        notes += [f"note: {line}" for line in _untold(selection)]
         notes += [f"decision: {line}" for line in decision.choices_sentences(assessments, selection, target)]
     floor = _floors(assessments) if selection is not None else []
     tables = map(table_text, _tables(assessments, selection, target))
@@ -95,6 +96,10 @@ def _remarks(assessments: Assessments, note: str = "") -> list[str]:
     return [
         f"{kind}{whose}: {line}".removeprefix(": ").lstrip() for kind, each in said for line, whose in _said_of(each)
     ]
+
+
+def _untold(selection: Selection) -> list[str]:
+    return [f"no intervals of the differences: {selection.reason}"] if selection.reason else []
 
 
 def _floors(assessments: Assessments) -> list[str]:
@@ -162,7 +167,7 @@ def _tables(assessments: Assessments, selection: Selection | None, target: str) 
     """Every measure of one proxy with success rates below, or proxies ranked; all cautions and notes once."""
     notes = tuple(_remarks(assessments))
     if selection is not None:
-        return [_ranking(assessments, selection, target, notes)]
+        return [_ranking(assessments, selection, target, (*notes, *_untold(selection)))]
     ((proxy, assessment),) = assessments.items()
     beside = [row for measure in BESIDE_PRPV for row in _rows(measure, assessment)]
     columns = (*columns_of(("measure",), ("value", "95 % interval")), *columns_of(("better", "what it says")))
@@ -304,7 +309,7 @@ def ranking_document(assessments: Assessments, selection: Selection) -> dict[str
         "choices": differences_document(selection.choices),
         "together": decision.together_document(selection),
         "cautions": list(dict.fromkeys(line for one in assessments.values() for line in one.cautions)),
-        "notes": [f"no intervals of the differences: {selection.reason}"] if selection.reason else [],
+        "notes": _untold(selection),
     }
 
 

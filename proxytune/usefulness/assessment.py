@@ -237,12 +237,14 @@ class Selection:
     ranking: tuple[tuple[str, int], ...]  # names and PRPV, best first
     # every two proxies, the better one first; the intervals hold for all of them at once
     differences: tuple[Difference, ...]
-    reason: str = ""  # why there are no intervals, empty if there are
+    reason: str = ""  # why there are no intervals, or not all, empty if there are
     # every two compared by what choosing by them gains, and by what they save; none if not assessed
     choices: tuple[Difference, ...] = ()
     together: Together | None = None  # the two that save most, used at once; None likewise
 
 
+FEWEST_STARTS = 4
+FEW_STARTS = "fewer than four starts say too little of the noise of a difference"
 FEWEST_RESAMPLES, MOST_RESAMPLES = 100, 1_000_000
 """Of a bootstrap that people ask for."""
 
@@ -286,7 +288,8 @@ def select_proxy(
     All proxies meet the same resampled target. The intervals are simultaneous: their width is set by the largest
     studentised deviation among all differences, so that looking at many pairs makes no false find more likely. A
     bootstrap of n starts sees √((n − 1)/n) of their deviation, and four say little of what that is: the width is
-    n/(n − 1) times its own, by which equal proxies are told apart as seldom as it says.
+    n/(n − 1) times its own, by which equal proxies are told apart as seldom as it says. Of fewer starts no noise is
+    known.
     """
     if not proxies:
         raise ScoresError("no proxy is given; name at least one")
@@ -309,5 +312,9 @@ def select_proxy(
     fewest = {name: fewest_starts(side) for name, side in inputs.items()}
     starts = np.array([min(fewest[name] for name in pair) for pair in pairs])
     half = np.quantile(studentised.max(axis=0), resampling.CONFIDENCE) * deviation * starts / (starts - 1)
-    rows = zip(pairs, observed, half, strict=True)
-    return Selection(ranking, tuple(Difference(*pair, int(v), float(v - h), float(v + h)) for pair, v, h in rows))
+    rows = zip(pairs, observed, half, starts >= FEWEST_STARTS, strict=True)
+    told = tuple(
+        Difference(*pair, int(v), *((float(v - h), float(v + h)) if enough else (None, None)))
+        for pair, v, h, enough in rows
+    )
+    return Selection(ranking, told, FEW_STARTS if starts.min() < FEWEST_STARTS else "")

@@ -70,7 +70,9 @@ def test_several_proxies_are_ranked_with_their_differences_and_told_apart_by_the
     difference = found["differences"][0]
     assert (difference["better"], difference["worse"]) == ("sim", "worse")
     assert difference["difference"] == found["proxies"][1]["prpv"] - found["proxies"][0]["prpv"]
-    assert difference["beyond_noise"] is (difference["interval"][0] > 0)
+    assert difference["beyond_noise"] is difference["interval"] is None, "of three starts"
+    assert "fewer than four starts" in found["notes"][0]
+    assert "note: no intervals of the differences: fewer than four" in shown("--proxy", "worse.csv", *SIDES, *METRIC)
     Path("other").mkdir()
     Path("other/sim.csv").write_text(SIM)
     found = document("--proxy", "sim.csv", "--proxy", "other/sim.csv", "--target", "real.csv", *METRIC)

@@ -155,6 +155,18 @@ def test_differences_are_of_prpv_and_none_of_a_proxy_with_itself():
     assert selection.differences[0].beyond_noise is False
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_proxies_of_fewer_than_four_starts_are_not_told_apart_and_the_rest_are(seed):
+    few = noisy(TRUTH, seed, episodes=3)
+    proxies = {"few": few, "good": noisy(TRUTH, seed + 10), "bad": noisy(-TRUTH, seed + 20)}
+    selection = select_proxy(proxies=proxies, target=TARGET, metrics=CLEAR)
+    told = {frozenset((pair.better, pair.worse)): pair.beyond_noise for pair in selection.differences}
+    assert told == {frozenset(("good", "bad")): True, frozenset(("few", "good")): None, frozenset(("few", "bad")): None}
+    assert "fewer than four starts" in selection.reason
+    found = select_proxy(proxies=proxies, target=few, metrics=CLEAR)
+    assert {pair.low for pair in found.differences} == {None}
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(("names", "starts"), [("ab", 4), ("ab", 10), ("abc", 10)])
 def test_equally_good_proxies_are_seldom_told_apart_even_by_four_starts(names, starts):

@@ -29,7 +29,7 @@ from proxytune.usefulness.pairs import prpv_of_means, stand
 FloorKind = Literal["same starts", "halves", "none"]
 MEANINGS: dict[FloorKind, str] = {
     "same starts": "target against itself from the same starts: what a perfect proxy scores",
-    "halves": "two halves of the target's episodes against each other: an upper bound of the noise floor",
+    "halves": "two halves of the target against each other: an upper bound of the noise floor where few agents tie",
     "none": "target against itself",
 }
 
@@ -39,7 +39,7 @@ class NoiseFloor:
     """PRPV of one domain against itself."""
 
     # "same starts": from the same starts under other placement noise, what a perfect proxy would score.
-    # "halves": halves of the starts, which are other ones; no more than an upper bound of that. "none": neither
+    # "halves": halves of the starts, which are other ones: an upper bound of that where few agents tie. "none": neither
     kind: FloorKind
     value: float | None = None  # the mean over draws or splits; None if there is no noise floor
     low: float | None = None  # lower end of the central 95 % of draws or splits; None if there is no noise floor

@@ -149,6 +149,23 @@ def test_an_agent_with_less_than_two_starts_driven_both_times_gives_no_floor_but
     assert told in found.reason
 
 
+@pytest.mark.parametrize(("rates", "bound"), [((0.95, 0.95), False), ((0.1, 0.9), True)])
+def test_halves_bound_what_a_perfect_proxy_scores_where_few_agents_tie_and_are_said_to_there_alone(rates, bound):
+    """Half as many episodes of rates near 1 tie more often, and a tie on both sides costs nothing."""
+    rng, rates = np.random.default_rng(43), np.linspace(*rates, 8)[:, None]
+    halves, perfect, tied = [], [], []
+    for seed in range(60):
+        proxy, target = (table_of(rng.random((8, 10)) < rates) for _ in range(2))
+        found = floor_of_halves(target=target, metrics=FIRST, seed=seed)
+        halves.append(found.value)
+        perfect.append(float(prpv_of_means(proxy.means, target.means, FIRST)))
+        scores = np.sort(target.means[:, 0])
+        tied.append(np.isclose(scores[:, None], scores)[np.triu_indices(8, 1)].mean())
+    assert bool(np.mean(halves) >= np.mean(perfect)) is bound
+    assert bool(np.mean(tied) <= 0.2) is bound
+    assert found.meaning.endswith("an upper bound of the noise floor where few agents tie")
+
+
 @pytest.mark.skipif(not SCORES.is_dir(), reason="the measured scores of ../shared/data are not here")
 def test_the_real_duckiebots_two_episodes_have_one_split():
     chosen = [Metric("distance"), Metric("survival_time_s")]

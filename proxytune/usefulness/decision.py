@@ -412,7 +412,7 @@ def _means(
         residuals = values - np.nanmean(values, axis=1, keepdims=True)
         residuals -= residuals.mean(axis=0) if shared else 0.0
         squares = np.nansum(residuals**2, axis=1)
-        own = squares / np.maximum(degrees, TINY)
+        own = squares / np.where(degrees > 0.0, degrees, 1.0)
         if shared and agents > 2:  # an agent's residuals have a share of all agents' noise
             own = (own * (agents - 1.0) - squares.sum() / degrees.sum()) / (agents - 2.0)
         return moderate(own, degrees, float(squares.sum() / degrees.sum()))

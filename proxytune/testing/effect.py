@@ -119,6 +119,7 @@ def ask(what: str, question: Callable[[], Answer]) -> Answer:
 
 CUTTINGS, STEPS = 8, 9
 DRIFT = 1e-11
+AMID = 40
 
 
 def check_effect(effect: type[Effect], *, robot: Robot | None = None, least: float = 1e-3) -> None:
@@ -153,6 +154,8 @@ def _check(subject: Subject, least: float) -> None:
             what = f"effect '{subject.name}' at {parameter.name} {value:g}"
             _claim_filter(subject, effect, what)
             _claim_chunks(subject, effect, what)
+            if hasattr(effect, "recall"):
+                _claim_recall(subject, effect, what)
     if subject.kind.trace is not None:
         _claim_seed(subject, bool(subject.kind.trace.draws))
         _claim_no_drift(subject)
@@ -242,6 +245,17 @@ def _claim_nothing_in_place(subject: Subject, effect: Effect, what: str) -> None
     same &= np.array_equal(effect.apply(signal, middle)[0], second)
     claim(same, f"{what} changes a memory in place; make a new one")
     claim(np.array_equal(signal, kept), f"{what} changes the signal in place; make a new one")
+
+
+def _claim_recall(subject: Subject, effect: Any, what: str) -> None:
+    """What begins amid a longer signal goes on as that does."""
+    drives = np.stack([subject.signal(seed) for seed in range(3)])
+    row, sample = np.array([2, 0]), np.array([AMID, AMID])
+    driven, ahead = (subject.context(subject.rest(drives[: len(one)])) for one in (drives, row))
+    whole, _ = effect.apply(drives, effect.begin(driven))
+    amid, _ = effect.apply(drives[row][:, AMID:], effect.recall(ahead, driven, drives, row, sample))
+    apart = _apart(amid, whole[row][:, AMID:])
+    claim(apart <= DRIFT, f"{what} goes on amid a signal {apart:.2g} unlike it; recall what came before")
 
 
 def _claim_seed(subject: Subject, draws: bool) -> None:

@@ -62,6 +62,16 @@ class InPlace(Slow):
         return filtered, memory
 
 
+class AtRestAmid(Slow):
+    def recall(self, context, whole, signal, row, sample):
+        return self.begin(context)
+
+
+class Recalling(Slow):
+    def recall(self, context, whole, signal, row, sample):
+        return signal[row, sample - 1][:, None]
+
+
 class Chancy(Slow):
     def apply(self, signal, memory):
         return signal + self.share * np.random.default_rng().normal(size=signal.shape), memory
@@ -122,6 +132,7 @@ BROKEN_EFFECTS = {
     Forgetful: "slow' at share 0.* changes by .* if the signal is cut at .*; keep memory",
     FromTheEnd: "depends on samples that come later",
     InPlace: "changes a memory in place",
+    AtRestAmid: "goes on amid a signal .* unlike it; recall what came before",
     Chancy: "gives two results for one seed",
     Seeded: "depends on the seed, and its trace says otherwise",
     NotNeutral: "changes the signal at its neutral value",
@@ -137,7 +148,7 @@ BROKEN_EFFECTS = {
 
 def test_an_effect_agent_engine_or_measure_that_keeps_every_promise_passes():
     effect: type[Effect] = Slow
-    assert check_effect(effect) is None
+    assert check_effect(effect) is check_effect(Recalling) is None
     share, bend = Bent.parameters
     assert check_effect(type("Shaped", (Bent,), {"parameters": (share, replace(bend, shape=True))})) is None
     assert check_agent(Agent) is check_agent(AGENTS["steady"]) is None

@@ -196,6 +196,8 @@ def test_unidentified_parameters_have_no_interval_values_outside_theirs_have_and
     text = said((TRIM, DELAY), **ABOVE, information=TOLD)
     assert "trim 0.121 (0.108 to 0.146); delay is unidentified." in text
     assert "add an agent or a metric whose scores change with delay (so far agent4's do most), or a log" in text
+    few = said((TRIM, DELAY), **ABOVE, information=tuple(replace(one, limit="trials") for one in TOLD))
+    assert few.endswith("Next: raise budget from 24 to 48, to get closer."), "its outputs are not known near the answer"
     nothing = said((DELAY, replace(DELAY, name="blur")), **ABOVE, information=())
     assert nothing.startswith("θ is unknown: delay and blur are unidentified.")
     perfect = said((DELAY,), information=())

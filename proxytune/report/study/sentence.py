@@ -154,7 +154,7 @@ def _say_what_to_add(result: StudyResult) -> str:
     settings, least, most_starts = result.study.settings, _least_known(result), result.study.family.starts
     told = (one for one in result.information if one.name == least.name)
     informed = next((one for one in told if any(share > 0.0 for _, share in one.agents)), None)
-    if not least.identified:
+    if not least.identified and (informed is None or informed.limit == "starts"):
         best = f" (so far {informed.agents[0][0]}'s do most)" if informed else ""
         log = ", or a log for `diagnose`" if settings.family == DEFAULT_FAMILY else ""
         return f"add an agent or a metric whose scores change with {plain(least.name)}{best}{log}"

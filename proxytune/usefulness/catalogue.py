@@ -170,7 +170,13 @@ POD_IMAGE = Measure(
     "mean difference under the same commands, 0 to 1", ".3g", "of full scale", in_paper=True,
 )  # fmt: skip
 
-MEASURES = (PRPV, PPV, SRCC, KENDALL_TAU, MMRV)
+MEASURES: tuple[Measure, ...] = (
+    PRPV,
+    PPV,
+    SRCC,
+    KENDALL_TAU,
+    MMRV,
+)
 """Those of score tables, in the order in which they are reported; a new one is a module of its own and a line here."""
 PODS = (POD_POSE, POD_IMAGE)
 """Those of the same commands in both domains, which a sweep replays."""

@@ -173,6 +173,17 @@ def test_windows_start_from_measured_wheel_speeds_where_there_are_any_and_are_to
     assert np.abs(window_paths(measured, TRUTH, begin, 60) - known).max() > 0.02
 
 
+@pytest.mark.parametrize("body", [{"inertia.forward": 0.5, "inertia.turn": 0.5}, {"yaw_lag": 0.8}])
+def test_the_body_of_a_robot_that_is_met_in_motion_moves_as_its_wheels_ask_from_the_first_tick_on(replayed, body):
+    held = np.broadcast_to((0.3, 0.5), replayed.duties.shape)
+    met = replace(replayed, duties=held.copy(), rest=held[:, 0].copy())
+    moved = innovations.twists_of(met, body)
+    np.testing.assert_allclose(moved, np.broadcast_to(moved[:, -1:], moved.shape), atol=1e-9)
+    assert (moved[..., 2] > 0.2).all()
+    stood = innovations.twists_of(replace(met, rest=np.zeros_like(met.rest)), body)
+    assert (stood[:, 0, 2] < 0.1).all()
+
+
 @pytest.mark.parametrize("effect", ["battery_sag.fade", "thermal_fade.loss", "backlash.gap"])
 def test_a_window_from_measured_wheel_speeds_recalls_what_its_drive_did_to_battery_motors_and_gears(effect):
     theta = {"thermal_fade.time_constant": 5.0, effect: 0.4}

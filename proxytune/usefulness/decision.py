@@ -174,7 +174,8 @@ def decide(inputs: Comparison, asked: Asked, saving: Saving | None = None, seed:
         return replace(bare, reason=_unknown(inputs.target, columns))
     every, counts, means, basis = known
     draws, sign = np.mean(every, axis=0), signs[0]
-    if (stretch := _stretch(inputs.target, columns)) > 1.0:
+    stretch = _stretch(inputs.target, columns)
+    if stretch > 1.0:
         middle = draws.mean(axis=0)
         # Not beyond what the metrics' own draws reach, as rates of 0 and 1
         draws = np.clip(middle + stretch * (draws - middle), np.min(every), np.max(every))
@@ -186,7 +187,7 @@ def decide(inputs: Comparison, asked: Asked, saving: Saving | None = None, seed:
     order = np.argsort(-best, kind="stable")
     held = order[: int(np.searchsorted(np.cumsum(best[order]), CONFIDENCE - ROUNDING)) + 1]
     spread = draws.std(axis=0)
-    middle, low, high = _spans(inputs.target, columns, means, counts, saving)
+    middle, low, high = _spans(inputs.target, columns, means, counts, stretch, saving)
     centre, most = sign * middle, np.zeros(len(agents))
     if all(_has_prior(inputs.target, column) for column in columns):
         # Of agents that, or whose best rival, always or never succeeded: there the prior pulls draws away from rates
@@ -360,9 +361,14 @@ def _stretch(target: ScoreTable, columns: Sequence[int]) -> float:
 
 
 def _spans(
-    target: ScoreTable, columns: Sequence[int], means: Sequence[Floats], counts: Sequence[Floats], saving: Saving | None
+    target: ScoreTable,
+    columns: Sequence[int],
+    means: Sequence[Floats],
+    counts: Sequence[Floats],
+    stretch: float,
+    saving: Saving | None,
 ) -> tuple[Floats, Floats, Floats]:
-    """Each agent's mean over metrics and the ends of its 95 % interval.
+    """Each agent's mean over metrics and the ends of its 95 % interval, stretched as the draws are.
 
     These follow from the ends by each metric (Zou and Donner, 2008, "Construction of confidence limits about effect
     measures").
@@ -376,7 +382,7 @@ def _spans(
         else:
             ends = own + NORMAL_95 * np.asarray(target.errors)[:, column] * [[-1.0], [1.0]]
         squares += (ends - own) ** 2
-    below, above = _stretch(target, columns) * np.sqrt(squares) / len(columns)
+    below, above = stretch * np.sqrt(squares) / len(columns)
     middle = np.mean(means, axis=0)
     if all(_has_prior(target, column) for column in columns):
         return middle, (middle - below).clip(0.0), (middle + above).clip(max=1.0)
